@@ -1,10 +1,11 @@
 """Ensembles, sweeps and comparisons: run what is missing, gather, add seeds until it is enough."""
 
+import contextlib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fdnet.campaign.engine import HowToRun, run_missing
 from fdnet.campaign.page import pair_lines, ranking_lines, write_comparison
@@ -104,7 +105,7 @@ def ensemble(
         fdnet.errors.CaseError: seeds: 0, expected 1 or more, ...
     """
     given = case if isinstance(case, Case) else read_case(case)
-    plan = ensemble_plan(given, seeds, **_plan_options(how))
+    plan = ensemble_plan(given, seeds, **_of_plan(how))
     return _carried_out(expanded(out), plan, until, max_seeds, **how)
 
 
@@ -127,7 +128,7 @@ def sweep(
             ...
         fdnet.errors.CaseError: no-such-sweep.toml: cannot be read as a sweep file: ...
     """
-    plan = sweep_plan(path, **_plan_options(how))
+    plan = sweep_plan(path, **_of_plan(how))
     return _carried_out(expanded(out), plan, until, max_seeds, **how)
 
 
@@ -163,13 +164,11 @@ def gathered(runs: Sequence[Path], out: Path, ranked_by: str) -> Comparison:
     return comparison
 
 
-def _plan_options(how: Mapping[str, Any]) -> dict[str, Any]:
-    stages = tuple(how.get("stages", STAGES))
-    return {
-        "limit": how.get("jobs_limit", MOST_JOBS),
-        "ranks": how.get("ranks", 1),
-        "stages": stages,
-    }
+def _of_plan(how: dict[str, Any]) -> dict[str, Any]:
+    """Takes what belongs to the plan out of `how`."""
+    stages = tuple(how.pop("stages", STAGES))
+    limit, ranks = how.pop("jobs_limit", MOST_JOBS), how.pop("ranks", 1)
+    return {"limit": limit, "ranks": ranks, "stages": stages}
 
 
 def _carried_out(
@@ -181,9 +180,6 @@ def _carried_out(
     ranked_by: str = RANKED_BY,
     jobs: int | None = None,
     progress: bool = False,
-    ranks: int = 1,
-    stages: Sequence[str] = (),
-    jobs_limit: int = 0,
     **how: Any,
 ) -> Compared:
     running = HowToRun(jobs=jobs or max(1, cores() // plan.ranks), quiet=not progress, **how)
@@ -205,19 +201,13 @@ def _compared(comparison: Comparison) -> Compared:
 
 
 FEWEST = 3
-"""Seeds before a band is believed; two say almost nothing of a spread."""
+"""Seeds before a band is believed."""
 _UNTIL = re.compile(r"\s*([\w.]+)\s*(?:±|\+-|\+/-)\s*([0-9.eE+-]+)\s*(%?)\s*")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Until:
-    """How narrow the band of a quantity is to be.
-
-    Attributes:
-        quantity: of the summaries.
-        half_width: of the 95 % band, over the mean if `relative`, else in the quantity's unit.
-        relative: whether `half_width` is a share of the mean.
-    """
+class Until(NamedTuple):
+    """How narrow the 95 % band of a quantity is to be: half of it, over the mean if `relative`,
+    else in the quantity's unit."""
 
     quantity: str
     half_width: float
@@ -237,10 +227,9 @@ def parse_until(text: str) -> Until:
     Raises CaseError for anything else.
     """
     match = _UNTIL.fullmatch(text)
-    try:
+    width = 0.0
+    with contextlib.suppress(ValueError):
         width = float(match[2]) if match else 0.0
-    except ValueError:
-        width = 0.0
     if match is None or not 0 < width < float("inf"):
         raise CaseError(
             f"--until {text!r}: expected a quantity and the half of its band, e.g. "
@@ -248,7 +237,7 @@ def parse_until(text: str) -> Until:
         )
     percent = match[3] == "%"
     relative = percent and SHARES.search(match[1]) is None
-    return Until(quantity=match[1], half_width=width / (100 if percent else 1), relative=relative)
+    return Until(match[1], width / 100 if percent else width, relative)
 
 
 def carry_out(
@@ -290,23 +279,20 @@ def carry_out(
 
 def _refuse_hopeless(path: Path, plan: Plan, how: HowToRun) -> None:
     """Raise what stops every variant, before anything is written."""
-    first: FdnetError | None = None
-    for variant in plan.variants:
-        options = RunOptions(
-            out=path / RUNS / f"{variant.name}-seed-{variant.case.seed}",
-            ranks=plan.ranks,
-            stages=plan.stages,
-            liggghts=how.liggghts,
-            launcher=how.launcher,
-            timeout=how.timeout,
-        )
+    errors: list[FdnetError] = []
+    program: dict[str, Any] = {
+        "liggghts": how.liggghts,
+        "launcher": how.launcher,
+        "timeout": how.timeout,
+    }
+    for one in plan.variants:
+        out = path / RUNS / f"{one.name}-seed-{one.case.seed}"
         try:
-            refuse(variant.case, options)
+            refuse(one.case, RunOptions(out=out, ranks=plan.ranks, stages=plan.stages, **program))
             return
         except FdnetError as error:
-            first = first or error
-    if first is not None:
-        raise first
+            errors.append(error)
+    raise errors[0]
 
 
 def _seeds_to_add(until: Until, comparison: Comparison, have: int, most: int) -> int:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from fdnet.campaign.plan import CASES, LOGS, PACKS, RUNS, Plan, last_words, state_of
 from fdnet.errors import CaseError
@@ -26,10 +26,8 @@ from fdnet.files import disk_is_full, write_text
 from fdnet.run.folder import MANIFEST, RECORDS
 from fdnet.run.progress import ONE_CORE
 
-PAUSE = 0.05
-"""Seconds between two looks at the running processes."""
-PATIENCE = 60.0
-"""Seconds that runs may take to stop in good order."""
+PAUSE, PATIENCE = 0.05, 120.0
+"""Seconds between two looks at the runs, and seconds that they may take to stop in good order."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,12 +55,10 @@ class HowToRun:
     @property
     def options(self) -> list[str]:
         """Options of `fdnet run`, beside those of the plan."""
-        words = []
-        if self.liggghts:
-            words += ["--liggghts", str(Path(self.liggghts).expanduser().absolute())]
-        if self.launcher:
-            words += ["--launcher", self.launcher]
-        return words if self.timeout is None else [*words, "--timeout", repr(self.timeout)]
+        path = self.liggghts and str(Path(self.liggghts).expanduser().absolute())
+        timeout = None if self.timeout is None else repr(self.timeout)
+        given = {"--liggghts": path, "--launcher": self.launcher, "--timeout": timeout}
+        return [word for name, value in given.items() if value for word in (name, value)]
 
     def say(self, text: str) -> None:
         """Show how far it is."""
@@ -70,47 +66,18 @@ class HowToRun:
             print(f"fdnet: {text}", file=sys.stderr, flush=True)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Task:
-    """One process of a campaign.
-
-    Attributes:
-        name: of its log.
-        words: what it calls, run in the folder of the campaign.
-        makes: file below the folder that is there when it has succeeded.
-        after: name of the task that must have ended before; "" for none.
-    """
+class Task(NamedTuple):
+    """One process of a campaign: its name, what it calls in the folder of the campaign, the file
+    that is there when it has succeeded, and the task that must have ended before."""
 
     name: str
-    words: tuple[str, ...]
+    words: Sequence[str]
     makes: str
     after: str = ""
 
 
-def tasks_of(path: Path, plan: Plan, how: HowToRun) -> list[Task]:
-    """What is missing in the folder: packs that several runs share, and runs that are not done.
-
-    A run whose files were changed is asked again, and `fdnet run` says so in its log.
-    """
-    common = ["--resume", "--quiet", "--np", str(plan.ranks), *how.options]
-    packs: dict[str, Task] = {}
-    runs = []
-    for job in plan.jobs:
-        if state_of(path, plan, job).status == "done":
-            continue
-        start = (sys.executable, "-m", "fdnet.cli", "run", f"{CASES}/{job.name}.toml", *common)
-        words = [*start, "--out", f"{RUNS}/{job.name}", "--stages", ",".join(plan.stages)]
-        digest, after = plan.packs.get(job.name, ""), ""
-        if digest:
-            words += ["--pack-from", f"{PACKS}/{digest}"]
-            makes = f"{PACKS}/{digest}/{RECORDS['pack']}"
-            if not (path / makes).is_file():
-                after = f"pack-{digest}"
-                pack = (*start, "--out", f"{PACKS}/{digest}", "--stages", "pack")
-                packs.setdefault(digest, Task(name=after, words=pack, makes=makes))
-        makes = f"{RUNS}/{job.name}/{MANIFEST}"
-        runs.append(Task(name=job.name, words=tuple(words), makes=makes, after=after))
-    return [*packs.values(), *runs]
+Ended = Callable[[str, int], None]
+"""Gets the name and the exit code of a task that has ended."""
 
 
 def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
@@ -119,16 +86,13 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
     A run that fails stops no other. Raises CaseError when the disk is full, when Snakemake is not
     installed, and when it did not begin.
     """
-    tasks = tasks_of(path, plan, how)
+    tasks = _tasks_of(path, plan, how)
     if not tasks:
         return
-    if how.engine == "slurm" and find_spec("snakemake_executor_plugin_slurm") is None:
+    plugin = "snakemake_executor_plugin_slurm" if how.engine == "slurm" else "snakemake"
+    if how.engine != "local" and not (has_snakemake() and find_spec(plugin)):
         raise CaseError(
-            "--slurm: Snakemake's executor for Slurm is not installed; pip install 'fdnet[sweep]'"
-        )
-    if how.engine != "local" and not has_snakemake():
-        raise CaseError(
-            f"--engine {how.engine}: Snakemake is not installed; pip install 'fdnet[sweep]', or "
+            f"--engine {how.engine}: {plugin} is not installed; pip install 'fdnet[sweep]', or "
             "take --engine local"
         )
     missing = sum(task.makes.endswith(MANIFEST) for task in tasks)
@@ -140,7 +104,7 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
     def ended(name: str, code: int) -> None:
         nonlocal count
         count += 1
-        word = "done" if code == 0 else f"FAILED (exit code {code})"
+        word = f"FAILED (exit code {code})" if code else "done"
         how.say(f"{count} of {len(tasks)}: {name} {word}")
 
     if how.engine == "local":
@@ -149,30 +113,87 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
         _run_snakemake(path, plan, tasks, how, lock, ended)
 
 
+def _tasks_of(path: Path, plan: Plan, how: HowToRun) -> list[Task]:
+    """What is missing in the folder: packs that several runs share, and runs that are not done.
+
+    A run whose files were changed is asked again, and `fdnet run` says so in its log.
+    """
+    shared, packs, runs = plan.packs, dict[str, Task](), []
+    for job in plan.jobs:
+        if state_of(path, plan, job).status == "done":
+            continue
+        start = [sys.executable, "-m", "fdnet.cli", "run", f"{CASES}/{job.name}.toml"]
+        start += ["--resume", "--quiet", "--np", str(plan.ranks), *how.options]
+        words = [*start, "--out", f"{RUNS}/{job.name}", "--stages", ",".join(plan.stages)]
+        digest, after = shared.get(job.name), ""
+        if digest:
+            folder = f"{PACKS}/{digest}"
+            words += ["--pack-from", folder]
+            made = f"{folder}/{RECORDS['pack']}"
+            if not (path / made).is_file():
+                after = f"pack-{digest}"
+                packs[after] = Task(after, [*start, "--out", folder, "--stages", "pack"], made)
+        runs.append(Task(job.name, words, f"{RUNS}/{job.name}/{MANIFEST}", after))
+    return [*packs.values(), *runs]
+
+
 def _log(path: Path, name: str) -> Path:
     return path / LOGS / f"{name}.txt"
+
+
+def _start(words: Sequence[str], path: Path, log: Path, **more: Any) -> subprocess.Popen:
+    """A process of one thread in a session of its own, which works in `path`."""
+    with log.open("wb") as file:
+        return subprocess.Popen(
+            words,
+            cwd=path,
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=subprocess.STDOUT,
+            env=os.environ | ONE_CORE,
+            start_new_session=True,
+            **more,
+        )
+
+
+def _stop(
+    running: Iterable[subprocess.Popen], kill: Callable[[int, int], None], number: int
+) -> None:
+    """End these processes by a signal in good order, after PATIENCE by SIGKILL."""
+    deadline = time.monotonic() + PATIENCE
+    open_still = [process for process in running if process.poll() is None]
+    for process in open_still:
+        with contextlib.suppress(ProcessLookupError):
+            kill(process.pid, number)
+    for process in open_still:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(max(0.1, deadline - time.monotonic()))
+        if process.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
 
 
 # ------------------------------------------------------------------------------------------------
 # The pool: some processes at a time on this machine, nothing else needed.
 
 
-def _run_pool(path: Path, tasks: list[Task], jobs: int, ended: Callable[[str, int], None]) -> None:
+def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> None:
     """Run the tasks, `jobs` at a time. One that fails stops only those that need what it makes.
 
     When this is left by an exception, the running ones are stopped in good order.
     """
-    waiting, running = list(tasks), dict[str, subprocess.Popen]()
-    full = False
+    waiting, running, full = list(tasks), dict[str, subprocess.Popen](), False
     try:
         while running or (waiting and not full):
             full = full or disk_is_full(path)
-            open_names = {task.name for task in waiting} | running.keys()
-            for task in [] if full else list(waiting):
-                if task.after not in open_names and len(running) < jobs:
-                    waiting.remove(task)
-                    with _log(path, task.name).open("wb") as log:
-                        running[task.name] = _start(task.words, path, log, _end_with_parent)
+            not_ended = {task.name for task in waiting} | running.keys()
+            ready = [task for task in waiting if task.after not in not_ended]
+            for task in [] if full else ready[: jobs - len(running)]:
+                waiting.remove(task)
+                running[task.name] = _start(
+                    task.words, path, _log(path, task.name), preexec_fn=_end_with_parent
+                )
             for name in [name for name, process in running.items() if process.poll() is not None]:
                 code = running.pop(name).returncode
                 if code < 0:  # it could not write its reason itself
@@ -184,7 +205,7 @@ def _run_pool(path: Path, tasks: list[Task], jobs: int, ended: Callable[[str, in
                 ended(name, code)
             time.sleep(PAUSE)
     finally:
-        _stop(running.values(), signal.SIGTERM, whole_group=False)
+        _stop(running.values(), os.kill, signal.SIGTERM)
     if full and waiting:
         raise CaseError(
             f"{path}: the disk is full; {len(waiting)} jobs were not started: free space, then "
@@ -192,44 +213,9 @@ def _run_pool(path: Path, tasks: list[Task], jobs: int, ended: Callable[[str, in
         )
 
 
-def _start(
-    words: Sequence[str], path: Path, log: Any, before: Any = None, **more: Any
-) -> subprocess.Popen:
-    return subprocess.Popen(
-        words,
-        cwd=path,
-        stdin=subprocess.DEVNULL,
-        stdout=log,
-        stderr=subprocess.STDOUT,
-        env=os.environ | ONE_CORE,
-        start_new_session=True,
-        preexec_fn=before,
-        **more,
-    )
-
-
 def _end_with_parent() -> None:
     """Ask the kernel for a SIGTERM when the parent dies, however it dies (PR_SET_PDEATHSIG)."""
     ctypes.CDLL(None).prctl(1, signal.SIGTERM, 0, 0, 0)
-
-
-def _stop(processes: Iterable[subprocess.Popen], number: int, *, whole_group: bool) -> None:
-    """End these processes: first in good order, after PATIENCE by SIGKILL."""
-    running = [process for process in processes if process.poll() is None]
-    for process in running:
-        with contextlib.suppress(ProcessLookupError):
-            if whole_group:
-                os.killpg(process.pid, number)
-            else:
-                process.send_signal(number)
-    deadline = time.monotonic() + PATIENCE
-    for process in running:
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(max(0.1, deadline - time.monotonic()))
-        if process.poll() is None:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
 
 
 # ------------------------------------------------------------------------------------------------
@@ -237,7 +223,7 @@ def _stop(processes: Iterable[subprocess.Popen], number: int, *, whole_group: bo
 
 
 SNAKEFILE = str(resources.files("fdnet.campaign").joinpath("Snakefile"))
-_SNAKEMAKE_LOG, _CONFIG = "logs/snakemake.txt", "logs/snakemake.json"
+_CONFIG = f"{LOGS}/snakemake.json"
 _REASON = re.compile(
     r"^(?!.*(?:check log file|Error in rule|Look above)).*(?:[Ee]rror|Exception|failed|locked).*$",
     re.MULTILINE,
@@ -250,69 +236,55 @@ def has_snakemake() -> bool:
 
 
 def _run_snakemake(
-    path: Path,
-    plan: Plan,
-    tasks: list[Task],
-    how: HowToRun,
-    lock: int,
-    ended: Callable[[str, int], None],
+    path: Path, plan: Plan, tasks: Sequence[Task], how: HowToRun, lock: int, ended: Ended
 ) -> None:
-    """Run what is missing as jobs of Snakemake, which gets its stop as one of the terminal.
+    """Run what is missing as jobs of Snakemake, which cancels them when it is stopped by SIGINT.
 
-    Snakemake inherits the lock of the folder, so that no other call works there while it lives,
-    also when this process is killed.
+    Snakemake inherits the lock of the folder and its name stands in it, so that no other call
+    works there while it lives, also when this process is killed.
     """
     write_text(path / _CONFIG, json.dumps({"options": how.options}))
-    if os.pread(lock, 1, 0):  # Snakemake was killed before: its lock is nobody's
+    words, log = _snakemake_words(how, plan), _log(path, "snakemake")
+    if os.pread(lock, 1, 0) and any(path.glob(".snakemake/locks/*")):
         how.say("an earlier Snakemake was killed here; its lock is removed")
-        with (path / _SNAKEMAKE_LOG).open("wb") as log:
-            _start([*_command(how, plan), "--unlock"], path, log).wait()
+        _start([*words, "--unlock"], path, log).wait()
     open_tasks = {task.name: path / task.makes for task in tasks}
-    with (path / _SNAKEMAKE_LOG).open("wb") as log:
-        process = _start([*_command(how, plan)], path, log, pass_fds=(lock,))
+    process = _start(words, path, log, pass_fds=(lock,))
     holder = f"Snakemake (process {process.pid} on {socket.gethostname()}) still runs the jobs of "
     holder += f"this folder; wait for its end, or stop it with kill -INT -{process.pid}"
+    os.truncate(lock, 0)
     os.pwrite(lock, holder.encode(), 0)
     try:
-        while open_tasks:
+        over = False
+        while not over:
             over = process.poll() is not None
             for name in [name for name, made in open_tasks.items() if made.exists()]:
                 del open_tasks[name]
                 ended(name, 0)
-            if over:
-                break
             time.sleep(PAUSE)
-        process.wait()
     finally:
-        _stop([process], signal.SIGINT, whole_group=True)
-        os.ftruncate(lock, 0)
-    begun = any(last_words(_log(path, task.name)) for task in tasks)
-    if process.returncode and not begun and open_tasks:
-        text = (path / _SNAKEMAKE_LOG).read_text("utf-8", "replace")
-        reasons = dict.fromkeys(line.strip() for line in _REASON.findall(text))
+        _stop([process], os.killpg, signal.SIGINT)
+        os.truncate(lock, 0)
+    if process.returncode and not any(last_words(_log(path, task.name)) for task in tasks):
+        lines = _REASON.findall(log.read_text("utf-8", "replace"))
+        reasons = " | ".join(dict.fromkeys(line.strip() for line in lines))[:1000]
         raise CaseError(
-            f"{path / _SNAKEMAKE_LOG}: Snakemake ended with exit code {process.returncode} before "
-            f"any run: {' | '.join(reasons)[:1000] or last_words(path / _SNAKEMAKE_LOG)}"
+            f"{log}: Snakemake ended with exit code {process.returncode} before any run: "
+            f"{reasons or last_words(log)}"
         )
 
 
-def _command(how: HowToRun, plan: Plan) -> list[str]:
+def _snakemake_words(how: HowToRun, plan: Plan) -> list[str]:
     words = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--configfile", _CONFIG]
     words += ["--until", "run", "--keep-going", "--rerun-incomplete"]
     if how.engine == "snakemake":
         return [*words, "--cores", str(how.jobs * plan.ranks)]
     words += ["--executor", "slurm", "--jobs", str(how.jobs), "--latency-wait", "30"]
-    if not _has_accounting():
-        words += ["--slurm-status-command", "squeue"]
-    resources = [_quoted(one) for one in how.resources if "=" in one]
-    return words + (["--default-resources", *resources] if resources else [])
-
-
-def _has_accounting() -> bool:
-    """Whether sacct answers: without accounting it does not, and no job would be seen to end."""
-    with contextlib.suppress(OSError):
-        return subprocess.run(["sacct", "-X"], capture_output=True, check=False).returncode == 0
-    return False
+    with contextlib.suppress(OSError):  # without accounting sacct would see no job end
+        if subprocess.run(["sacct", "-X"], capture_output=True, check=False).returncode:
+            words += ["--slurm-status-command", "squeue"]
+    quoted = [_quoted(one) for one in how.resources]
+    return words + (["--default-resources", *quoted] if quoted else [])
 
 
 def _quoted(resource: str) -> str:

@@ -1,18 +1,4 @@
-"""The plan of a campaign: a sweep file, its cases and seeds, and the folder that keeps it.
-
-case = "sand.toml"            # or cases = ["one.toml", "other.toml"]
-seeds = 4                     # or [1, 2, 5]
-[set]                         # for every run
-analysis.sections = 2
-[grid]                        # every combination of these values
-fines.radius_mm = [0.04, 0.05]
-[[variants]]                  # and of these, each with a name
-name = "thin"
-fluid.viscosity = "10 cP"
-[judge]                       # kept for who judges the results
-reference = { "fines.radius_mm" = 0.04 }
-quantities = ["k_reduction"]
-"""
+"""The plan of a campaign: a sweep file, its cases and seeds, and the folder that keeps it."""
 
 import contextlib
 import difflib
@@ -20,13 +6,14 @@ import fcntl
 import hashlib
 import itertools
 import json
+import math
 import os
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import (
     AfterValidator,
@@ -54,14 +41,10 @@ MOST_JOBS = 1000
 # The plan: which cases are run with which seeds, frozen before the first run.
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Variant:
-    """One case of a campaign; its runs differ by the seed alone.
+class Variant(NamedTuple):
+    """One case of a campaign, whose runs differ by the seed alone, and the keys that are varied.
 
-    Attributes:
-        name: short name, which also begins the names of its run folders.
-        keys: the keys that are varied, dotted, with their values.
-        case: the case; its seed is that of the first run.
+    Its name also begins the names of its run folders; its seed is that of the first run.
     """
 
     name: str
@@ -69,8 +52,7 @@ class Variant:
     case: Case
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Job:
+class Job(NamedTuple):
     """One run of a plan: the name of its folder below `runs/`, its variant, its case."""
 
     name: str
@@ -115,7 +97,7 @@ class Plan:
     def jobs(self) -> tuple[Job, ...]:
         """Every run; those of one seed stand together, so that few seeds of all come first."""
         return tuple(
-            Job(name=f"{one.name}-seed-{seed}", variant=one, case=_with_seed(one.case, seed))
+            Job(f"{one.name}-seed-{seed}", one, _with_seed(one.case, seed))
             for seed in self.seeds
             for one in self.variants
         )
@@ -142,9 +124,8 @@ def ensemble_plan(case: Case, seeds: int, *, limit: int = MOST_JOBS, **more: Any
     if seeds < 1 or case.seed + seeds > 2**31:
         raise CaseError(f"seeds: {seeds}, expected 1 or more, and no seed above {2**31 - 1}")
     _refuse_many(1, seeds, limit)
-    variants = _named([Variant(name=case.name, keys={}, case=case)])
-    seeds_of_it = tuple(range(case.seed, case.seed + seeds))
-    return Plan(name=case.name, variants=variants, seeds=seeds_of_it, **more)
+    variants, own = _named([Variant(case.name, {}, case)]), range(case.seed, case.seed + seeds)
+    return Plan(name=case.name, variants=variants, seeds=tuple(own), **more)
 
 
 def _refuse_many(variants: int, seeds: int, limit: int) -> None:
@@ -165,7 +146,7 @@ def _named(variants: Sequence[Variant]) -> tuple[Variant, ...]:
         number, base = 2, name
         while name in result:
             name, number = f"{base}-{number}", number + 1
-        result[name] = replace(one, name=name)
+        result[name] = one._replace(name=name)
     return tuple(result.values())
 
 
@@ -184,10 +165,8 @@ def _dotted(table: Any) -> Any:
         return table
     result: dict[str, Any] = {}
     for name, value in table.items():
-        if isinstance(value, Mapping) and "." not in name:
-            result |= {f"{name}.{key}": one for key, one in value.items()}
-        else:
-            result[name] = value
+        nested = isinstance(value, Mapping) and "." not in name
+        result |= {f"{name}.{k}": one for k, one in value.items()} if nested else {name: value}
     return result
 
 
@@ -200,29 +179,13 @@ def _varied(keys: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _distinct(seeds: Any) -> Any:
     """A number of seeds, or a list of different seeds."""
-    listed = isinstance(seeds, list)
-    numbers = seeds if listed else [seeds]
-    whole = all(isinstance(one, int) and not isinstance(one, bool) for one in numbers)
-    if not numbers or not whole or min(numbers) < (0 if listed else 1) or max(numbers) >= 2**31:
+    numbers, least = (seeds, 0) if isinstance(seeds, list) else ([seeds], 1)
+    whole = all(type(one) is int for one in numbers)
+    if not numbers or not whole or min(numbers) < least or max(numbers) >= 2**31:
         raise ValueError(f"expected their number, 1 or more, or a list of seeds below {2**31}")
     if len(set(numbers)) < len(numbers):
         raise ValueError("names a seed twice")
     return seeds
-
-
-_Keys = Annotated[dict[str, Any], BeforeValidator(_dotted), AfterValidator(_varied)]
-_Grid = Annotated[
-    dict[str, Annotated[list[Any], Field(min_length=1)]],
-    BeforeValidator(_dotted),
-    AfterValidator(_varied),
-]
-_Line = Annotated[str, Field(min_length=1), AfterValidator(lambda text: _one_line(text))]
-
-
-def _one_line(text: str) -> str:
-    if not text.isprintable():
-        raise ValueError("expected one line of text without control characters")
-    return text
 
 
 class _Table(BaseModel):
@@ -236,6 +199,9 @@ class _Judge(_Table):
     quantities: Annotated[list[str], Field(min_length=1)]
 
 
+_Values = Annotated[list[Any], Field(min_length=1)]
+
+
 class _SweepFile(_Table):
     """What a sweep file holds."""
 
@@ -243,8 +209,8 @@ class _SweepFile(_Table):
     case: str | None = None
     cases: Annotated[list[str], Field(min_length=1)] = []
     seeds: Annotated[Any, AfterValidator(_distinct)] = 1
-    set: _Keys = {}
-    grid: _Grid = {}
+    set: Annotated[dict[str, Any], BeforeValidator(_dotted), AfterValidator(_varied)] = {}
+    grid: Annotated[dict[str, _Values], BeforeValidator(_dotted), AfterValidator(_varied)] = {}
     variants: list[dict[str, Any]] = []
     targets: dict[str, Any] = {}
     judge: _Judge | None = None
@@ -263,11 +229,11 @@ class _SweepFile(_Table):
         """Name and keys of each variant."""
         rows = []
         for table in self.variants:
-            own = _varied(_dotted({k: v for k, v in table.items() if k != "name"}))
-            rows.append((table.get("name") or _label(own), dict(own)))
-        for name, _ in rows:
-            if not isinstance(name, str) or not name.isprintable():
+            own = dict(_varied(_dotted({k: v for k, v in table.items() if k != "name"})))
+            name = table.get("name", _label(own))
+            if not isinstance(name, str) or not name or not name.isprintable():
                 raise ValueError(f"variants.name: {name!r}, expected one line of text")
+            rows.append((name, own))
         return rows
 
 
@@ -294,88 +260,70 @@ def sweep_plan(path: str | Path, *, limit: int = MOST_JOBS, **more: Any) -> Plan
         file = _SweepFile.model_validate(toml_tables(path, "a sweep file"))
     except ValidationError as error:
         raise CaseError(f"{path}: {' | '.join(map(_problem, error.errors()))}") from error
-    combinations = [
-        dict(zip(file.grid, values, strict=True))
-        for values in itertools.islice(itertools.product(*file.grid.values()), limit + 1)
-    ]
     paths = [place.parent / expanded(case) for case in file.cases or [file.case or ""]]
-    count = len(paths) * max(1, len(file.variants))
-    for values in file.grid.values():
-        count *= len(values)
-    seeds = file.seeds if isinstance(file.seeds, list) else range(file.seeds)
-    _refuse_many(count, len(seeds), limit)
+    count = len(paths) * max(1, len(file.variants)) * math.prod(map(len, file.grid.values()))
+    seeds = file.seeds if isinstance(file.seeds, list) else list(range(min(file.seeds, limit + 1)))
+    _refuse_many(count, file.seeds if isinstance(file.seeds, int) else len(seeds), limit)
     variants, problems = [], []
     for case_path, (name, own), values in itertools.product(
-        paths, file.named_keys or [("", {})], combinations
+        paths, file.named_keys or [("", {})], itertools.product(*file.grid.values())
     ):
-        keys = {**own, **values}
-        label = "+".join(filter(None, (name, _label(values)))) or case_path.stem
+        swept = dict(zip(file.grid, values, strict=True))
+        keys = {**own, **swept}
+        label = "+".join(filter(None, (name, _label(swept)))) or case_path.stem
         try:
             case = read_case(case_path, values={**file.set, **keys})
         except CaseError as error:
             problems.append(f"{label}: {error}")
             continue
+        label = label if keys else case.name
         if len(paths) > 1:
-            label = f"{case.name}-{label}" if keys else case.name
+            label = f"{case.name}-{label}" if keys else label
             keys = {"case_file": case_path.name} | keys
-        variants.append(Variant(name=label if keys else case.name, keys=keys, case=case))
+        variants.append(Variant(label, keys, case))
     if problems:
         raise CaseError(" || ".join(problems[:5]))
     if isinstance(file.seeds, int):
         seeds = [variants[0].case.seed + number for number in seeds]
-    plan = Plan(
+    judge = file.judge.model_dump() if file.judge else {}
+    _check_judge(f"{path}: judge", judge, variants)
+    return Plan(
         name=file.name or _safe(place.stem),
         variants=_named(variants),
         seeds=tuple(seeds),
         targets=file.targets,
-        judge=file.judge.model_dump() if file.judge else {},
+        judge=judge,
         **more,
     )
-    _check_judge(str(path), plan)
-    return plan
 
 
 def _problem(item: Any) -> str:
     """One thing that is wrong in a sweep file, with its key and what was given."""
-    key, given = ".".join(map(str, item["loc"])), item["input"]
+    key, message = ".".join(map(str, item["loc"])), item["msg"].removeprefix("Value error, ")
     if item["type"] == "extra_forbidden":
         known = _Judge if key.startswith("judge.") else _SweepFile
         return f"{key}: unknown key, expected some of {', '.join(known.model_fields)}"
-    message = item["msg"].removeprefix("Value error, ")
     if item["type"] == "string_pattern_mismatch":
         message = "expected letters, digits, dots, underscores, hyphens, a letter or digit first"
-    return f"{key}: {given!r:.60}, {message}" if key else message
+    return f"{key}: {item['input']!r:.60}, {message}" if key else message
 
 
-OTHER_QUANTITIES = (
-    *("answer", "damage", "drag_last_update", "drag_updates", "filtrate_m3", "grain_overlap"),
-    *("k_", "max_overlap", "momentum_defect", "network_counts", "physical_time_s", "porosity_"),
-    *("rate_over", "scatter", "seconds", "sizes", "skin", "solver", "throats_", "dem_", "cake"),
-    *("clean_up", "bridging", "invaded_", "cpu", "core", "memory", "peak", "left_out", "ranks"),
-)
-"""Beginnings of the numbers that only some summaries have."""
+def _check_judge(place: str, judge: Mapping[str, Any], variants: Sequence[Variant]) -> None:
+    """Raises CaseError for a reference that is no variant and for a misspelt quantity.
 
-
-def _check_judge(path: str, plan: Plan) -> None:
-    """Raises CaseError for a reference that is no variant and a quantity that no run has."""
-    if not plan.judge:
-        return
-    reference = plan.judge["reference"]
-    if not any(reference.items() <= dict(one.keys).items() for one in plan.variants):
-        raise CaseError(
-            f"{path}: judge.reference: {reference} are the keys of no variant; the varied keys "
-            f"are {', '.join(plan.keys) or 'none'}"
-        )
-    known = [name for name in Summary.model_fields if name not in ("case", "seed", "law")]
-    inside = [*SummarySection.model_fields, "k_initial_inplace_m2", "k_damaged_inplace_m2"]
-    for name in plan.judge["quantities"]:
+    Numbers that only some runs have, as those of a well, are known by their results alone.
+    """
+    reference = judge.get("reference", {})
+    if not any(reference.items() <= dict(one.keys).items() for one in variants):
+        keys = ", ".join(dict.fromkeys(key for one in variants for key in one.keys)) or "none"
+        raise CaseError(f"{place}.reference: {reference} is no variant; the varied keys: {keys}")
+    for name in judge.get("quantities", []):
         section = re.fullmatch(r"sections\.[1-9]\d*\.(\w+)", name)
-        if name in known or (section and section[1] in inside):
-            continue
-        near = difflib.get_close_matches(name, known, n=3, cutoff=0.6)
-        if near or not name.startswith(OTHER_QUANTITIES):
+        known, last = (SummarySection, section[1]) if section else (Summary, name)
+        near = difflib.get_close_matches(last, known.model_fields, n=3, cutoff=0.8)
+        if last not in known.model_fields and (near or not re.fullmatch(r"\w+(\.\w+)*", name)):
             raise CaseError(
-                f"{path}: judge.quantities: {name!r} is no number of the summaries; did you mean "
+                f"{place}.quantities: {name!r} is no number of the summaries; did you mean "
                 f"{', '.join(near) or 'k_reduction'}?"
             )
 
@@ -389,15 +337,10 @@ _Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9=+_-][A-Za-z0-9.=+_-]*$")]
 _Seed = Annotated[int, Field(ge=0, lt=2**31)]
 
 
-class _VariantRecord(JsonObject):
+class _Row(JsonObject):
     name: _Name
-    keys: dict[str, Any]
-
-
-class _RunRecord(JsonObject):
-    name: _Name
-    variant: _Name
-    seed: _Seed
+    variant: _Name = "itself"
+    seed: _Seed = 0
 
 
 class _PlanRecord(JsonObject):
@@ -407,8 +350,8 @@ class _PlanRecord(JsonObject):
     name: str
     digest: str
     seeds: Annotated[list[_Seed], Field(min_length=1)]
-    variants: Annotated[list[_VariantRecord], Field(min_length=1)]
-    runs: Annotated[list[_RunRecord], Field(min_length=1)]
+    variants: Annotated[list[_Row], Field(min_length=1)]
+    runs: Annotated[list[_Row], Field(min_length=1)]
 
 
 def read_plan_record(folder: Path) -> dict[str, Any] | None:
@@ -430,23 +373,16 @@ def kept_plan(folder: Path) -> Plan | None:
     record = read_plan_record(folder)
     if record is None:
         return None
-    first = {one["variant"]: one["name"] for one in reversed(record["runs"])}
-    variants = [
-        Variant(
-            name=one["name"],
-            keys=one["keys"],
-            case=read_case(folder / CASES / f"{first[one['name']]}.toml"),
-        )
-        for one in record["variants"]
-    ]
+    first = {one["variant"]: folder / CASES / f"{one['name']}.toml" for one in record["runs"]}
     return Plan(
         name=record["name"],
-        variants=tuple(variants),
+        variants=tuple(
+            Variant(one["name"], one["keys"], read_case(first[one["name"]]))
+            for one in record["variants"]
+        ),
         seeds=tuple(record["seeds"]),
-        ranks=record.get("ranks", 1),
+        **{key: record[key] for key in ("ranks", "targets", "judge") if key in record},
         stages=tuple(record.get("stages", STAGES)),
-        targets=record.get("targets", {}),
-        judge=record.get("judge", {}),
     )
 
 
@@ -487,9 +423,8 @@ def campaign_folder(path: Path, plan: Plan) -> Iterator[tuple[Plan, int]]:
 def _refuse_foreign(path: Path) -> None:
     if path.exists() and not path.is_dir():
         raise CaseError(f"{path}: is a file, expected a folder for --out")
-    if not path.is_dir() or read_plan_record(path) is not None:
-        return
-    if {child.name for child in path.iterdir()} - {LOCK, LOGS, CASES}:
+    foreign = path.is_dir() and {child.name for child in path.iterdir()} - {LOCK, LOGS, CASES}
+    if foreign and read_plan_record(path) is None:
         raise CaseError(
             f"{path}: is not empty and holds no campaign of fdnet; give another --out (nothing "
             "was changed)"
@@ -498,16 +433,16 @@ def _refuse_foreign(path: Path) -> None:
 
 def _admitted(path: Path, plan: Plan) -> Plan:
     record = read_plan_record(path)
-    if record is None:
-        return extended(path, plan, ())
-    if record["digest"] != plan.digest:
+    if record is not None and record["digest"] != plan.digest:
         names = ", ".join(one["name"] for one in record["variants"][:3])
         raise CaseError(
             f"{path}: holds another plan ({record['name']}: {names}...; digest "
             f"{record['digest']}, this one {plan.digest}); give another --out (nothing was "
             "changed)"
         )
-    return extended(path, replace(plan, seeds=tuple(record["seeds"])), plan.seeds)
+    return extended(
+        path, replace(plan, seeds=tuple(record["seeds"])) if record else plan, plan.seeds
+    )
 
 
 def extended(path: Path, plan: Plan, seeds: Sequence[int]) -> Plan:
@@ -547,8 +482,7 @@ def extended(path: Path, plan: Plan, seeds: Sequence[int]) -> Plan:
 # Which runs of a plan are done, and why the others are not.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class State:
+class State(NamedTuple):
     """How a run stands: "done", "failed" or "missing", and why it is not done, in one line."""
 
     status: str
@@ -562,32 +496,26 @@ def state_of(path: Path, plan: Plan, job: Job) -> State:
     failed where one of its files was changed, cut or removed afterwards.
     """
     folder = path / RUNS / job.name
-    if (folder / MANIFEST).exists():
-        try:
-            return _finished(folder, plan, job)
-        except CaseError as error:
-            return State(status="failed", reason=str(error))
-    for name in (job.name, f"pack-{job.case.digest('pack')}"):
-        reason = last_words(path / LOGS / f"{name}.txt")
-        if reason:
-            return State(status="failed", reason=reason)
-    return State(status="missing", reason="not run yet")
-
-
-def _finished(folder: Path, plan: Plan, job: Job) -> State:
-    """A run with a manifest. Raises CaseError where its files are not what it wrote."""
-    manifest, case = check_finished(folder)
-    if case.digest() != job.case.digest():
-        raise CaseError(
-            f"{folder}: holds the run of another case than the plan has under this name; remove "
-            "the folder, and it is run again"
+    if not (folder / MANIFEST).exists():
+        logs = (
+            path / LOGS / f"{name}.txt" for name in (job.name, f"pack-{job.case.digest('pack')}")
         )
-    read_summary(folder / "summary.json")
-    missing = {stage for stage in plan.stages if stage in job.case.stages}
-    missing -= set(manifest["stages"])
-    if missing:
-        return State(status="missing", reason=f"not run yet: {', '.join(sorted(missing))}")
-    return State(status="done")
+        reason = next(filter(None, map(last_words, logs)), "")
+        return State("failed", reason) if reason else State("missing", "not run yet")
+    try:
+        manifest, case = check_finished(folder)
+        if case.digest() != job.case.digest():
+            raise CaseError(
+                f"{folder}: holds the run of another case than the plan has under this name; "
+                "remove the folder, and it is run again"
+            )
+        read_summary(folder / "summary.json")
+    except CaseError as error:
+        return State("failed", str(error))
+    lacking = set(plan.stages) & set(job.case.stages) - set(manifest["stages"])
+    if lacking:
+        return State("missing", f"not run yet: {', '.join(sorted(lacking))}")
+    return State("done")
 
 
 def last_words(path: Path) -> str:

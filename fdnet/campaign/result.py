@@ -6,7 +6,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.util import find_spec
 from itertools import combinations
 from pathlib import Path
@@ -35,8 +35,7 @@ _NEVER_NEGATIVE = re.compile(r"((?<!\bb_s)_m|_m2|_m3|_s|_count|_over_k0)$|^secon
 # Runs gathered by variant.
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Entry:
+class Entry(NamedTuple):
     """A run of a comparison.
 
     Attributes:
@@ -45,10 +44,10 @@ class Entry:
         seed: of the run.
         keys: varied keys with their values.
         folder: the run folder.
-        status: "done", "failed" or "missing".
-        reason: why it is not done; "" when it is.
         pack: digest of the case's pack: two runs with the same have the same grains.
         numbers: every number of summary.json, by dotted key; {} of a run that is not done.
+        status: "done", "failed" or "missing".
+        reason: why it is not done; "" when it is.
     """
 
     name: str
@@ -56,10 +55,10 @@ class Entry:
     seed: int
     keys: Mapping[str, Any]
     folder: Path
+    pack: str
+    numbers: Mapping[str, Any]
     status: str = "done"
     reason: str = ""
-    pack: str = ""
-    numbers: Mapping[str, Any] = field(default_factory=dict)
 
     def number(self, quantity: str) -> float | int | None:
         """The quantity where it is a finite number, and no yes or no."""
@@ -213,19 +212,9 @@ def gather_plan(path: Path, plan: Plan, *, ranked_by: str = RANKED_BY) -> Compar
     entries = []
     for job in plan.jobs:
         state, folder = state_of(path, plan, job), path / RUNS / job.name
-        entries.append(
-            Entry(
-                name=job.name,
-                variant=job.variant.name,
-                seed=job.case.seed,
-                keys=job.variant.keys,
-                folder=folder,
-                status=state.status,
-                reason=state.reason,
-                pack=job.case.digest("pack"),
-                numbers=_numbers_of(folder) if state.status == "done" else {},
-            )
-        )
+        numbers = _numbers_of(folder) if state.status == "done" else {}
+        of_case = (job.variant.name, job.case.seed, job.variant.keys, folder)
+        entries.append(Entry(job.name, *of_case, job.case.digest("pack"), numbers, *state))
     return Comparison(
         title=plan.name, path=path, keys=plan.keys, entries=tuple(entries), ranked_by=ranked_by
     )
@@ -251,15 +240,8 @@ def gather_runs(runs: Sequence[Path], out: Path, *, ranked_by: str = RANKED_BY) 
     names = _variant_names([case.name for case in cases.values()], varied)
     entries: dict[tuple[str, int], Entry] = {}
     for (folder, case), name, held in zip(cases.items(), names, varied, strict=True):
-        entry = Entry(
-            name=folder.name,
-            variant=name,
-            seed=case.seed,
-            keys=held,
-            folder=folder.absolute(),
-            pack=case.digest("pack"),
-            numbers=_numbers_of(folder),
-        )
+        of_case = (name, case.seed, held, folder.absolute(), case.digest("pack"))
+        entry = Entry(folder.name, *of_case, _numbers_of(folder))
         same = entries.setdefault((name, case.seed), entry)
         if same is not entry:
             raise CaseError(
@@ -358,6 +340,10 @@ def _variant_names(cases: Sequence[str], varied: Sequence[Mapping[str, Any]]) ->
 # table.csv, table.parquet and summary.json.
 
 
+def _relative(comparison: Comparison, entry: Entry) -> str:
+    return os.path.relpath(entry.folder, comparison.path)
+
+
 def write_table(comparison: Comparison) -> None:
     """Write table.csv, and table.parquet where pyarrow is installed: one row for each run.
 
@@ -375,7 +361,7 @@ def write_table(comparison: Comparison) -> None:
             "seed": entry.seed,
             "status": entry.status,
             "reason": entry.reason,
-            "folder": os.path.relpath(entry.folder, comparison.path),
+            "folder": _relative(comparison, entry),
             **{key: entry.numbers.get(key) for key in numbers},
         }
         for entry in comparison.entries
@@ -401,20 +387,17 @@ def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, 
     Each quantity has its mean and 95 % band over the seeds; with several variants, the mean over
     the variants and, under `variants`, that of each. One variant has no rank.
     """
+    failures = [
+        {"run": one.name, "status": one.status, "reason": one.reason}
+        | {"folder": _relative(comparison, one)}
+        for one in comparison.failed
+    ]
     result: dict[str, Any] = {
         "title": comparison.title,
         "runs": len(comparison.entries),
         "done": len(comparison.done),
-        "failed": len(comparison.failed),
-        "failures": [
-            {
-                "run": entry.name,
-                "status": entry.status,
-                "reason": entry.reason,
-                "folder": os.path.relpath(entry.folder, comparison.path),
-            }
-            for entry in comparison.failed
-        ],
+        "failed": len(failures),
+        "failures": failures,
         "left_out": list(comparison.left_out),
         "ranked_by": comparison.ranked_by,
         "ranking": comparison.ranking() if len(comparison.variants) > 1 else [],
@@ -468,18 +451,11 @@ def _pair_row(pair: Pair) -> dict[str, Any]:
 
 MET, OPEN, MISSED = "met", "open", "missed"
 """The 95 % band lies below the limit, across it, or above it."""
-_ORDER = (MET, OPEN, MISSED)
 
 
 class Goal(NamedTuple):
-    """A target of a design, a largest value that is accepted.
-
-    Attributes:
-        words: the quantity in words.
-        quantity: name that gives its unit and its bounds.
-        of_run: its value in one finished run; None where the run has none.
-        read: the limit from the text of a design file, SI.
-    """
+    """A target of a design, a largest value that is accepted: in words, the quantity that gives
+    its unit and bounds, its value in one finished run, and the limit from its text, SI."""
 
     words: str
     quantity: str
@@ -494,22 +470,17 @@ def _passed(entry: Entry) -> float | None:
 
 GOALS: Mapping[str, Goal] = {
     "depth": Goal(
-        words="depth above which 95 % of the fines lie",
-        quantity="invasion_depth_p95_m",
-        of_run=lambda entry: entry.number("invasion_depth_p95_m"),
-        read=lambda text: converted(text, "_mm") / 1e3,
+        "depth above which 95 % of the fines lie",
+        "invasion_depth_p95_m",
+        lambda entry: entry.number("invasion_depth_p95_m"),
+        lambda text: converted(text, "_mm") / 1e3,
     ),
     "k_loss": Goal(
-        words="permeability lost",
-        quantity="k_reduction",
-        of_run=lambda entry: entry.number("k_reduction"),
-        read=share_of,
+        "permeability lost", "k_reduction", lambda entry: entry.number("k_reduction"), share_of
     ),
     "bridging": Goal(
-        words="share of the fines that pass through the specimen unbridged",
-        quantity="passed_fraction",
-        of_run=_passed,
-        read=share_of,
+        *("share of the fines that pass through the specimen unbridged", "passed_fraction"),
+        *(_passed, share_of),
     ),
 }
 
@@ -535,32 +506,28 @@ class Candidate(NamedTuple):
 
 def read_targets(targets: Mapping[str, Any]) -> dict[str, float]:
     """The limits of the table [targets], SI. Raises CaseError for unknown or unreadable ones."""
-    problems, limits = [], {}
+    limits = {}
     for name, text in targets.items():
         if name not in GOALS:
-            problems.append(f"targets.{name}: unknown, expected some of {', '.join(GOALS)}")
-            continue
+            raise CaseError(f"targets.{name}: unknown, expected some of {', '.join(GOALS)}")
         try:
             limits[name] = GOALS[name].read(str(text))
         except ValueError as error:
-            problems.append(f"targets.{name}: {text!r}: {error}")
-    if not targets:
-        problems.append('targets: missing; give the table [targets], e.g. k_loss = "30 %"')
-    if problems:
-        raise CaseError(" | ".join(problems))
+            raise CaseError(f"targets.{name}: {text!r}: {error}") from error
+    if not limits:
+        raise CaseError('targets: missing; give the table [targets], e.g. k_loss = "30 %"')
     return limits
 
 
 def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[Candidate]:
     """The muds by their verdicts: all met first, then by the mean nearest to its limit."""
-    muds = []
-    for name in comparison.variants:
-        if comparison.of_variant(name):
-            verdicts = tuple(_verdict(comparison, name, *one) for one in limits.items())
-            state = max((verdict.state for verdict in verdicts), key=_ORDER.index)
-            worst = max(v.band.mean / v.limit if v.limit else math.inf for v in verdicts)
-            muds.append(Candidate(name, verdicts, state, worst))
-    return sorted(muds, key=lambda mud: (_ORDER.index(mud.state), mud.worst))
+    order, muds = (MET, OPEN, MISSED), []
+    for name in filter(comparison.of_variant, comparison.variants):
+        verdicts = tuple(_verdict(comparison, name, *one) for one in limits.items())
+        state = max((verdict.state for verdict in verdicts), key=order.index)
+        worst = max(v.band.mean / v.limit if v.limit else math.inf for v in verdicts)
+        muds.append(Candidate(name, verdicts, state, worst))
+    return sorted(muds, key=lambda mud: (order.index(mud.state), mud.worst))
 
 
 def _verdict(comparison: Comparison, name: str, target: str, limit: float) -> Verdict:
