@@ -1,26 +1,42 @@
-"""Ensembles, sweeps and comparisons from Python."""
+"""Ensembles, sweeps and comparisons: run what is missing, gather, add seeds until it is enough."""
 
+import contextlib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from fdnet.campaign.campaign import Goal, carry_out
-from fdnet.campaign.engine.tasks import HowToRun
-from fdnet.campaign.page.page import write_comparison
-from fdnet.campaign.plan.ensemble import ensemble_plan
-from fdnet.campaign.plan.job import Plan
-from fdnet.campaign.plan.sweep import MOST_JOBS, plan_of, read_sweep
-from fdnet.campaign.result.comparison import RANKED_BY, Comparison, refuse_unknown
-from fdnet.campaign.result.gather import gather_runs, result_folder
-from fdnet.campaign.result.table import TABLE
-from fdnet.campaign.result.words import pair_lines, ranking_lines
-from fdnet.campaign.until import parse_until
+from fdnet.campaign.engine import HowToRun, run_missing
+from fdnet.campaign.page import pair_lines, ranking_lines, write_comparison
+from fdnet.campaign.plan import (
+    MOST_JOBS,
+    RUNS,
+    Plan,
+    campaign_folder,
+    ensemble_plan,
+    extended,
+    kept_plan,
+    sweep_plan,
+)
+from fdnet.campaign.result import (
+    RANKED_BY,
+    SHARES,
+    TABLE,
+    Comparison,
+    gather_plan,
+    gather_runs,
+    make_result_folder,
+    refuse_unknown,
+)
 from fdnet.case.case import Case
 from fdnet.case.file import read_case
+from fdnet.errors import CaseError, FdnetError
 from fdnet.files import expanded
 from fdnet.names import STAGES
-from fdnet.run.records import cores
+from fdnet.run.pipeline import refuse
+from fdnet.run.records import RunOptions, cores
+from fdnet.statistics.bands import seeds_for_width, student_band
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,8 +105,8 @@ def ensemble(
         fdnet.errors.CaseError: seeds: 0, expected 1 or more, ...
     """
     given = case if isinstance(case, Case) else read_case(case)
-    plan = ensemble_plan(given, seeds, **_plan_options(how))
-    return _carried_out(expanded(out), plan, how, until, max_seeds)
+    plan = ensemble_plan(given, seeds, **_of_plan(how))
+    return _carried_out(expanded(out), plan, until, max_seeds, **how)
 
 
 def sweep(
@@ -112,8 +128,8 @@ def sweep(
             ...
         fdnet.errors.CaseError: no-such-sweep.toml: cannot be read as a sweep file: ...
     """
-    plan = plan_of(read_sweep(path), **_plan_options(how))
-    return _carried_out(expanded(out), plan, how, until, max_seeds)
+    plan = sweep_plan(path, **_of_plan(how))
+    return _carried_out(expanded(out), plan, until, max_seeds, **how)
 
 
 def compare_runs(
@@ -121,8 +137,9 @@ def compare_runs(
 ) -> Compared:
     """Compare finished run folders; runs whose cases differ by the seed alone are one variant.
 
-    Lengths are in m and permeabilities in m2. Raises CaseError for a folder without a finished
-    run, and for a run that would be counted twice.
+    The folder of a campaign stands for all its finished runs; where `out` is this folder, its
+    own results are written anew. Lengths are in m and permeabilities in m2. Raises CaseError for
+    a folder without a finished run, and for a run that would be counted twice.
 
     Examples:
         >>> import fdnet
@@ -131,44 +148,43 @@ def compare_runs(
             ...
         fdnet.errors.CaseError: no/such/run: does not exist; ...
     """
-    folder = expanded(out)
-    comparison = gather_runs([expanded(run) for run in runs], folder, ranked_by=ranked_by)
-    refuse_unknown(comparison, ranked_by, "ranked_by")
-    with result_folder(folder):
-        return _compared(comparison)
+    return _compared(gathered([expanded(run) for run in runs], expanded(out), ranked_by))
 
 
-def _plan_options(how: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "limit": how.get("jobs_limit", MOST_JOBS),
-        "ranks": how.get("ranks", 1),
-        "stages": tuple(how.get("stages", STAGES)),
-    }
+def gathered(runs: Sequence[Path], out: Path, ranked_by: str) -> Comparison:
+    """The comparison of run folders, with the folder of its results made."""
+    own = kept_plan(out) if [one.resolve() for one in runs] == [out.resolve()] else None
+    if own is not None:
+        comparison = gather_plan(out, own, ranked_by=ranked_by)
+    else:
+        comparison = gather_runs(runs, out, ranked_by=ranked_by)
+    refuse_unknown(comparison, ranked_by, "--rank-by")
+    if own is None:
+        make_result_folder(out)
+    return comparison
 
 
-_HOW = {"jobs", "ranks", "stages", "liggghts", "launcher", "timeout", "engine", "ranked_by"}
+def _of_plan(how: dict[str, Any]) -> dict[str, Any]:
+    """Takes what belongs to the plan out of `how`."""
+    stages = tuple(how.pop("stages", STAGES))
+    limit, ranks = how.pop("jobs_limit", MOST_JOBS), how.pop("ranks", 1)
+    return {"limit": limit, "ranks": ranks, "stages": stages}
 
 
 def _carried_out(
-    path: Path, plan: Plan, how: Mapping[str, Any], until: str | None, max_seeds: int
+    path: Path,
+    plan: Plan,
+    until: str | None,
+    max_seeds: int,
+    *,
+    ranked_by: str = RANKED_BY,
+    jobs: int | None = None,
+    progress: bool = False,
+    **how: Any,
 ) -> Compared:
-    unknown = how.keys() - _HOW - {"progress", "jobs_limit"}
-    if unknown:
-        raise TypeError(f"unexpected arguments: {', '.join(sorted(unknown))}")
-    running = HowToRun(
-        jobs=how.get("jobs") or max(1, cores() // plan.ranks),
-        liggghts=how.get("liggghts"),
-        launcher=how.get("launcher"),
-        timeout=how.get("timeout"),
-        engine=how.get("engine", "local"),
-        quiet=not how.get("progress", False),
-    )
-    goal = Goal(
-        ranked_by=how.get("ranked_by", RANKED_BY),
-        until=None if until is None else parse_until(until),
-        most_seeds=max_seeds,
-    )
-    return _compared(carry_out(path, plan, running, goal))
+    running = HowToRun(jobs=jobs or max(1, cores() // plan.ranks), quiet=not progress, **how)
+    goal = None if until is None else parse_until(until)
+    return _compared(carry_out(path, plan, running, goal, ranked_by, most_seeds=max_seeds))
 
 
 def _compared(comparison: Comparison) -> Compared:
@@ -178,3 +194,118 @@ def _compared(comparison: Comparison) -> Compared:
         ranking=tuple(ranking_lines(comparison)),
         differences=tuple(pair_lines(comparison)),
     )
+
+
+# ------------------------------------------------------------------------------------------------
+# From a plan to its comparison.
+
+
+FEWEST = 3
+"""Seeds before a band is believed."""
+_UNTIL = re.compile(r"\s*([\w.]+)\s*(?:±|\+-|\+/-)\s*([0-9.eE+-]+)\s*(%?)\s*")
+
+
+class Until(NamedTuple):
+    """How narrow the 95 % band of a quantity is to be: half of it, over the mean if `relative`,
+    else in the quantity's unit."""
+
+    quantity: str
+    half_width: float
+    relative: bool
+
+    def allowed(self, values: Sequence[float]) -> float:
+        """Half-width that is narrow enough, in the quantity's unit."""
+        return self.half_width * (abs(sum(values) / len(values)) if self.relative else 1.0)
+
+
+def parse_until(text: str) -> Until:
+    """The goal that `--until` gives.
+
+    Percent of a share (k_reduction, a porosity) are points: 45 % ± 5 % is 40 to 50 %. Percent of
+    any other quantity are of its mean. Without percent the number has the quantity's unit.
+
+    Raises CaseError for anything else.
+    """
+    match = _UNTIL.fullmatch(text)
+    width = 0.0
+    with contextlib.suppress(ValueError):
+        width = float(match[2]) if match else 0.0
+    if match is None or not 0 < width < float("inf"):
+        raise CaseError(
+            f"--until {text!r}: expected a quantity and the half of its band, e.g. "
+            "'k_reduction ± 5 %' or 'k_damaged_m2 +- 10 %'"
+        )
+    percent = match[3] == "%"
+    relative = percent and SHARES.search(match[1]) is None
+    return Until(match[1], width / 100 if percent else width, relative)
+
+
+def carry_out(
+    path: Path,
+    plan: Plan,
+    how: HowToRun,
+    until: Until | None,
+    ranked_by: str,
+    *,
+    most_seeds: int = 32,
+    run: bool = True,
+) -> Comparison:
+    """Run what is missing of the plan in the folder `path`; returns the comparison.
+
+    With `until`, seeds are added, at most `most_seeds`. Without `run` it gathers what is there.
+
+    Raises CaseError for a folder of another plan and for a quantity that the summaries do not
+    have; the error of the first variant when no variant can be run at all, before anything is
+    written.
+    """
+    if run:
+        _refuse_hopeless(path, plan, how)
+    with campaign_folder(path, plan) as (held, lock):
+        while True:
+            if run:
+                run_missing(path, held, how, lock)
+            comparison = gather_plan(path, held, ranked_by=ranked_by)
+            refuse_unknown(comparison, ranked_by, "--rank-by")
+            more = 0
+            if until is not None and run and comparison.done:
+                refuse_unknown(comparison, until.quantity, "--until")
+                more = _seeds_to_add(until, comparison, len(held.seeds), most_seeds)
+            if not more:
+                return comparison
+            how.say(f"{len(held.seeds)} seeds are not enough yet; {more} more")
+            first = max(held.seeds) + 1
+            held = extended(path, held, range(first, first + more))
+
+
+def _refuse_hopeless(path: Path, plan: Plan, how: HowToRun) -> None:
+    """Raise what stops every variant, before anything is written."""
+    errors: list[FdnetError] = []
+    program: dict[str, Any] = {
+        "liggghts": how.liggghts,
+        "launcher": how.launcher,
+        "timeout": how.timeout,
+    }
+    for one in plan.variants:
+        out = path / RUNS / f"{one.name}-seed-{one.case.seed}"
+        try:
+            refuse(one.case, RunOptions(out=out, ranks=plan.ranks, stages=plan.stages, **program))
+            return
+        except FdnetError as error:
+            errors.append(error)
+    raise errors[0]
+
+
+def _seeds_to_add(until: Until, comparison: Comparison, have: int, most: int) -> int:
+    """How many seeds more the spread so far asks for; 0 when every band is narrow enough.
+
+    The whole bands are looked at, not what the bounds of the quantity leave of them. Seeds at most
+    double at a time, because a spread of few seeds is itself uncertain.
+    """
+    needed = 0
+    for name in comparison.variants:
+        values = list(comparison.values(name, until.quantity).values())
+        if 0 < len(values) < FEWEST:
+            needed = max(needed, have + FEWEST - len(values))
+        elif values and student_band(values).half_width > until.allowed(values):
+            needed = max(needed, seeds_for_width(values, until.allowed(values), most), have + 1)
+    return max(0, min(most, needed, 2 * have) - have)

@@ -2,9 +2,8 @@
 
 import argparse
 import json
-import shlex
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,17 +13,16 @@ from fdnet.files import path_option
 from fdnet.names import STAGES
 
 if TYPE_CHECKING:
-    from fdnet.campaign.campaign import Goal
-    from fdnet.campaign.engine.tasks import HowToRun
-    from fdnet.campaign.plan.job import Plan
-    from fdnet.campaign.result.comparison import Comparison
+    from fdnet.campaign.engine import HowToRun
+    from fdnet.campaign.plan import Plan
+    from fdnet.campaign.result import Comparison
 
 SOME_FAILED = 5
 """Exit code when some of the runs have no result."""
 MOST_SEEDS = 32
 
 
-def add_result(parser: argparse.ArgumentParser) -> None:
+def _add_result(parser: argparse.ArgumentParser) -> None:
     """Adds --out, --rank-by, --json and --quiet to a parser."""
     parser.add_argument(
         "--out", type=path_option, required=True, metavar="DIR", help="folder of the results"
@@ -40,9 +38,9 @@ def add_result(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def add_engine(parser: argparse.ArgumentParser) -> None:
+def _add_engine(parser: argparse.ArgumentParser) -> None:
     """Adds the options of the result, and what decides where and how the runs are carried out."""
-    add_result(parser)
+    _add_result(parser)
     add_ranks(parser)
     add_program(parser)
     parser.add_argument(
@@ -71,13 +69,6 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
         "slurm_partition=short,runtime=60",
     )
     parser.add_argument(
-        "--slurm-script",
-        nargs="?",
-        const="",
-        metavar="OPTIONS",
-        help="only write scripts for sbatch, with its options, e.g. partition=short,time=60",
-    )
-    parser.add_argument(
         "--until",
         metavar="GOAL",
         help="add seeds until the 95 %% band is as narrow, e.g. 'k_reduction ± 5 %%' or "
@@ -102,17 +93,16 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def how_of(options: argparse.Namespace) -> "HowToRun":
+def _how_of(options: argparse.Namespace) -> "HowToRun":
     """How to run the jobs. Raises CaseError on options that do not fit together."""
-    from fdnet.campaign.engine.snakemake import has_snakemake
-    from fdnet.campaign.engine.tasks import HowToRun
+    from fdnet.campaign.engine import HowToRun, has_snakemake
     from fdnet.run.records import cores
 
-    cluster = options.slurm is not None or options.slurm_script is not None
     if options.jobs is not None and options.jobs < 1:
         raise CaseError(f"--jobs {options.jobs}: expected 1 or more")
-    given = options.slurm if options.slurm is not None else options.slurm_script
-    engine = options.engine
+    cluster, engine = options.slurm is not None, options.engine
+    if cluster and engine == "local":
+        raise CaseError("--slurm: needs Snakemake; leave --engine local out")
     if engine == "auto":
         engine = "snakemake" if has_snakemake() else "local"
     return HowToRun(
@@ -120,27 +110,13 @@ def how_of(options: argparse.Namespace) -> "HowToRun":
         liggghts=options.liggghts,
         launcher=options.launcher,
         timeout=options.timeout,
-        engine="slurm" if options.slurm is not None else engine,
-        resources=tuple(part for part in (given or "").split(",") if part),
+        engine="slurm" if cluster else engine,
+        resources=tuple(part for part in (options.slurm or "").split(",") if part),
         quiet=options.quiet,
     )
 
 
-def goal_of(options: argparse.Namespace) -> "Goal":
-    """What the runs are for. Raises CaseError for a goal that cannot be read."""
-    from fdnet.campaign.campaign import Goal
-    from fdnet.campaign.until import parse_until
-
-    return Goal(
-        ranked_by=options.rank_by,
-        until=None if options.until is None else parse_until(options.until),
-        most_seeds=options.max_seeds,
-        run=not options.gather,
-        scripts=options.slurm_script is not None,
-    )
-
-
-def plan_options(options: argparse.Namespace) -> dict[str, Any]:
+def _plan_options(options: argparse.Namespace) -> dict[str, Any]:
     """Limit, ranks and stages of a plan."""
     stages = stages_of(options.stages)
     if "analyse" not in stages:
@@ -150,50 +126,50 @@ def plan_options(options: argparse.Namespace) -> dict[str, Any]:
     return {"limit": options.jobs_limit, "ranks": options.np, "stages": stages}
 
 
-def finish(
+def _finish(
     options: argparse.Namespace,
     comparison: "Comparison",
-    *,
-    ranked: Sequence[str] = (),
-    **more: Any,
+    limits: Mapping[str, float] | None = None,
 ) -> int:
     """Write tables and page, print the ranking; returns the exit code.
 
-    `ranked` are sentences above the ranking, `more` further keys of summary.json.
+    With `limits` of targets, the variants are ranked by them first.
     """
-    from fdnet.campaign.page.page import write_comparison
-    from fdnet.campaign.result.words import failure_lines, pair_lines, ranking_lines
+    from fdnet.campaign import page
+    from fdnet.campaign.result import candidates
 
-    summary = write_comparison(comparison, more, ranked)
+    muds = candidates(comparison, limits) if limits else []
+    states = [{"name": mud.name, "state": mud.state} for mud in muds]
+    more: dict[str, Any] = {"design": states, "targets": limits} if limits else {}
+    summary = page.write_comparison(comparison, more, muds)
     if options.json:
         print(json.dumps(summary, indent=1, default=str))
     else:
-        for line in [*ranked, *ranking_lines(comparison), *pair_lines(comparison)]:
+        lines = [*page.candidate_lines(muds), *page.ranking_lines(comparison)]
+        for line in [*lines, *page.pair_lines(comparison)]:
             print(line)
         print(f"page: {comparison.path / 'compare.html'}")
-    for line in failure_lines(comparison):
+    for line in page.failure_lines(comparison):
         print(f"fdnet: {line}", file=sys.stderr)
     return SOME_FAILED if comparison.failed else 0
 
 
-def run_campaign(
-    options: argparse.Namespace,
-    plan: "Plan",
-    judged: "Callable[[Comparison], Mapping[str, Any]] | None" = None,
+def _run_campaign(
+    options: argparse.Namespace, plan: "Plan", limits: Mapping[str, float] | None = None
 ) -> int:
-    """Carry out a plan and write its results; returns the exit code.
+    """Carry out a plan and write its results; returns the exit code."""
+    from fdnet.campaign.api import carry_out, parse_until
 
-    `judged` gives what `finish` shows besides.
-    """
-    from fdnet.campaign.campaign import carry_out
-
-    goal = goal_of(options)
-    comparison = carry_out(Path(options.out), plan, how_of(options), goal)
-    if goal.scripts:
-        script = shlex.quote(str(options.out / "submit.bash"))
-        print(f"submit with: bash {script}; then gather with --gather")
-        return 0
-    return finish(options, comparison, **({} if judged is None else judged(comparison)))
+    comparison = carry_out(
+        Path(options.out),
+        plan,
+        _how_of(options),
+        None if options.until is None else parse_until(options.until),
+        options.rank_by,
+        most_seeds=options.max_seeds,
+        run=not options.gather,
+    )
+    return _finish(options, comparison, limits)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -213,15 +189,15 @@ def add_ensemble(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of seeds, from that of the case on (default 4)",
     )
-    add_engine(parser)
+    _add_engine(parser)
     parser.set_defaults(action=_run_ensemble)
 
 
 def _run_ensemble(options: argparse.Namespace) -> int:
-    from fdnet.campaign.plan.ensemble import ensemble_plan
+    from fdnet.campaign.plan import ensemble_plan
 
-    plan = ensemble_plan(case_of(options), options.seeds, **plan_options(options))
-    return run_campaign(options, plan)
+    plan = ensemble_plan(case_of(options), options.seeds, **_plan_options(options))
+    return _run_campaign(options, plan)
 
 
 def add_sweep(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -230,14 +206,14 @@ def add_sweep(commands: Any, common: argparse.ArgumentParser) -> None:
         "sweep", parents=[common], help="many cases and seeds, compared with 95 %% bands"
     )
     parser.add_argument("sweep", type=path_option, metavar="SWEEP.toml", help="the sweep file")
-    add_engine(parser)
+    _add_engine(parser)
     parser.set_defaults(action=_run_sweep)
 
 
 def _run_sweep(options: argparse.Namespace) -> int:
-    from fdnet.campaign.plan.sweep import plan_of, read_sweep
+    from fdnet.campaign.plan import sweep_plan
 
-    return run_campaign(options, plan_of(read_sweep(options.sweep), **plan_options(options)))
+    return _run_campaign(options, sweep_plan(options.sweep, **_plan_options(options)))
 
 
 def add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -250,20 +226,17 @@ def add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
         nargs="+",
         type=path_option,
         metavar="RUN",
-        help="run folders; the folder of an ensemble or a sweep stands for all its runs",
+        help="run folders; the folder of an ensemble or a sweep stands for all its runs, and its "
+        "own results are written anew where it is --out too",
     )
-    add_result(parser)
+    _add_result(parser)
     parser.set_defaults(action=_run_compare)
 
 
 def _run_compare(options: argparse.Namespace) -> int:
-    from fdnet.campaign.result.comparison import refuse_unknown
-    from fdnet.campaign.result.gather import gather_runs, result_folder
+    from fdnet.campaign.api import gathered
 
-    comparison = gather_runs(options.runs, options.out, ranked_by=options.rank_by)
-    refuse_unknown(comparison, options.rank_by, "--rank-by")
-    with result_folder(options.out):
-        return finish(options, comparison)
+    return _finish(options, gathered(options.runs, options.out, options.rank_by))
 
 
 def add_design(commands: Any, common: argparse.ArgumentParser) -> None:
@@ -277,23 +250,13 @@ def add_design(commands: Any, common: argparse.ArgumentParser) -> None:
         metavar="DESIGN.toml",
         help="a sweep file with the table [targets]",
     )
-    add_engine(parser)
+    _add_engine(parser)
     parser.set_defaults(action=_run_design)
 
 
 def _run_design(options: argparse.Namespace) -> int:
-    from fdnet.campaign.plan.sweep import plan_of, read_sweep
-    from fdnet.campaign.result.targets import candidate_lines, candidates, read_targets
+    from fdnet.campaign.plan import sweep_plan
+    from fdnet.campaign.result import read_targets
 
-    sweep = read_sweep(options.sweep)
-    limits = read_targets(sweep.targets)
-
-    def judged(comparison: "Comparison") -> dict[str, Any]:
-        muds = candidates(comparison, limits)
-        return {
-            "ranked": candidate_lines(muds),
-            "design": [{"name": mud.name, "state": mud.state} for mud in muds],
-            "targets": limits,
-        }
-
-    return run_campaign(options, plan_of(sweep, **plan_options(options)), judged)
+    plan = sweep_plan(options.sweep, **_plan_options(options))
+    return _run_campaign(options, plan, read_targets(plan.targets))

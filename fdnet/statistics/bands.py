@@ -1,6 +1,11 @@
-"""A mean and its 95 % band."""
+"""A mean and its 95 % band, by Student (1908)."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
 
 CONFIDENCE = 0.95
 
@@ -43,3 +48,23 @@ class Band:
     def less(self, value: float) -> "Band":
         """The band of the mean less a known value."""
         return Band(mean=self.mean - value, low=self.low - value, high=self.high - value)
+
+
+def student_band(values: Sequence[float]) -> Band:
+    """Mean of (N,) values with Student's 95 % band; nan ends for a single value."""
+    mean = float(np.mean(values)) if len(values) else math.nan
+    half = _half(float(np.std(values, ddof=1)), len(values)) if len(values) > 1 else math.nan
+    return Band(mean=mean, low=mean - half, high=mean + half)
+
+
+def seeds_for_width(values: Sequence[float], half_width: float, most: int) -> int:
+    """Fewest seeds whose 95 % band is expected to be within `half_width`, at most `most`.
+
+    The spread is that of `values`: the first n with t(n-1) s / sqrt(n) <= half_width.
+    """
+    spread = float(np.std(values, ddof=1))
+    return next((n for n in range(2, most) if _half(spread, n) <= half_width), most)
+
+
+def _half(spread: float, count: int) -> float:
+    return float(student.ppf(0.5 + CONFIDENCE / 2, count - 1)) * spread / math.sqrt(count)

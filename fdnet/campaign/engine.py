@@ -1,0 +1,301 @@
+"""What carries out the runs of a plan: Snakemake with its executors, or a pool of processes.
+
+Each run is `fdnet run --resume` in a process of its own, which goes on where it was cut.
+"""
+
+import contextlib
+import ctypes
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fdnet.campaign.plan import CASES, LOGS, PACKS, RUNS, Plan, last_words, state_of
+from fdnet.errors import CaseError
+from fdnet.files import disk_is_full, write_text
+from fdnet.run.folder import MANIFEST, RECORDS
+from fdnet.run.progress import ONE_CORE
+
+PAUSE, PATIENCE = 0.05, 120.0
+"""Seconds between two looks at the runs, and seconds that they may take to stop in good order."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HowToRun:
+    """How runs are carried out, as opposed to what they are.
+
+    Attributes:
+        jobs: how many at the same time.
+        liggghts: path of the binary; None: looked for.
+        launcher: template that starts several ranks; None: mpirun.
+        timeout: s, after which LIGGGHTS of one run is stopped; None: never.
+        engine: "local", "snakemake", or "slurm" (Snakemake with its executor for Slurm).
+        resources: of Snakemake for Slurm, as ("slurm_partition=short", "runtime=60").
+        quiet: whether to show no progress.
+    """
+
+    jobs: int
+    liggghts: str | None = None
+    launcher: str | None = None
+    timeout: float | None = None
+    engine: str = "local"
+    resources: tuple[str, ...] = ()
+    quiet: bool = False
+
+    @property
+    def options(self) -> list[str]:
+        """Options of `fdnet run`, beside those of the plan."""
+        path = self.liggghts and str(Path(self.liggghts).expanduser().absolute())
+        timeout = None if self.timeout is None else repr(self.timeout)
+        given = {"--liggghts": path, "--launcher": self.launcher, "--timeout": timeout}
+        return [word for name, value in given.items() if value for word in (name, value)]
+
+    def say(self, text: str) -> None:
+        """Show how far it is."""
+        if not self.quiet:
+            print(f"fdnet: {text}", file=sys.stderr, flush=True)
+
+
+class Task(NamedTuple):
+    """One process of a campaign: its name, what it calls in the folder of the campaign, the file
+    that is there when it has succeeded, and the task that must have ended before."""
+
+    name: str
+    words: Sequence[str]
+    makes: str
+    after: str = ""
+
+
+Ended = Callable[[str, int], None]
+"""Gets the name and the exit code of a task that has ended."""
+
+
+def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
+    """Carry out what is missing of the plan; `lock` is the descriptor of the folder's lock.
+
+    A run that fails stops no other. Raises CaseError when the disk is full, when Snakemake is not
+    installed, and when it did not begin.
+    """
+    tasks = _tasks_of(path, plan, how)
+    if not tasks:
+        return
+    plugin = "snakemake_executor_plugin_slurm" if how.engine == "slurm" else "snakemake"
+    if how.engine != "local" and not (has_snakemake() and find_spec(plugin)):
+        raise CaseError(
+            f"--engine {how.engine}: {plugin} is not installed; pip install 'fdnet[sweep]', or "
+            "take --engine local"
+        )
+    missing = sum(task.makes.endswith(MANIFEST) for task in tasks)
+    how.say(f"{len(plan.jobs)} runs, {missing} of them to do")
+    for task in tasks:
+        _log(path, task.name).unlink(missing_ok=True)
+    count = 0
+
+    def ended(name: str, code: int) -> None:
+        nonlocal count
+        count += 1
+        word = f"FAILED (exit code {code})" if code else "done"
+        how.say(f"{count} of {len(tasks)}: {name} {word}")
+
+    if how.engine == "local":
+        _run_pool(path, tasks, how.jobs, ended)
+    else:
+        _run_snakemake(path, plan, tasks, how, lock, ended)
+
+
+def _tasks_of(path: Path, plan: Plan, how: HowToRun) -> list[Task]:
+    """What is missing in the folder: packs that several runs share, and runs that are not done.
+
+    A run whose files were changed is asked again, and `fdnet run` says so in its log.
+    """
+    shared, packs, runs = plan.packs, dict[str, Task](), []
+    for job in plan.jobs:
+        if state_of(path, plan, job).status == "done":
+            continue
+        start = [sys.executable, "-m", "fdnet.cli", "run", f"{CASES}/{job.name}.toml"]
+        start += ["--resume", "--quiet", "--np", str(plan.ranks), *how.options]
+        words = [*start, "--out", f"{RUNS}/{job.name}", "--stages", ",".join(plan.stages)]
+        digest, after = shared.get(job.name), ""
+        if digest:
+            folder = f"{PACKS}/{digest}"
+            words += ["--pack-from", folder]
+            made = f"{folder}/{RECORDS['pack']}"
+            if not (path / made).is_file():
+                after = f"pack-{digest}"
+                packs[after] = Task(after, [*start, "--out", folder, "--stages", "pack"], made)
+        runs.append(Task(job.name, words, f"{RUNS}/{job.name}/{MANIFEST}", after))
+    return [*packs.values(), *runs]
+
+
+def _log(path: Path, name: str) -> Path:
+    return path / LOGS / f"{name}.txt"
+
+
+def _start(words: Sequence[str], path: Path, log: Path, **more: Any) -> subprocess.Popen:
+    """A process of one thread in a session of its own, which works in `path`."""
+    with log.open("wb") as file:
+        return subprocess.Popen(
+            words,
+            cwd=path,
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=subprocess.STDOUT,
+            env=os.environ | ONE_CORE,
+            start_new_session=True,
+            **more,
+        )
+
+
+def _stop(
+    running: Iterable[subprocess.Popen], kill: Callable[[int, int], None], number: int
+) -> None:
+    """End these processes by a signal in good order, after PATIENCE by SIGKILL."""
+    deadline = time.monotonic() + PATIENCE
+    open_still = [process for process in running if process.poll() is None]
+    for process in open_still:
+        with contextlib.suppress(ProcessLookupError):
+            kill(process.pid, number)
+    for process in open_still:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(max(0.1, deadline - time.monotonic()))
+        if process.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+
+# ------------------------------------------------------------------------------------------------
+# The pool: some processes at a time on this machine, nothing else needed.
+
+
+def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> None:
+    """Run the tasks, `jobs` at a time. One that fails stops only those that need what it makes.
+
+    When this is left by an exception, the running ones are stopped in good order.
+    """
+    waiting, running, full = list(tasks), dict[str, subprocess.Popen](), False
+    try:
+        while running or (waiting and not full):
+            full = full or disk_is_full(path)
+            not_ended = {task.name for task in waiting} | running.keys()
+            ready = [task for task in waiting if task.after not in not_ended]
+            for task in [] if full else ready[: jobs - len(running)]:
+                waiting.remove(task)
+                running[task.name] = _start(
+                    task.words, path, _log(path, task.name), preexec_fn=_end_with_parent
+                )
+            for name in [name for name, process in running.items() if process.poll() is not None]:
+                code = running.pop(name).returncode
+                if code < 0:  # it could not write its reason itself
+                    with _log(path, name).open("a", encoding="utf-8") as log:
+                        log.write(
+                            f"\nfdnet: ended by signal {-code} ({signal.Signals(-code).name}), "
+                            "perhaps for want of memory; repeat the command to go on\n"
+                        )
+                ended(name, code)
+            time.sleep(PAUSE)
+    finally:
+        _stop(running.values(), os.kill, signal.SIGTERM)
+    if full and waiting:
+        raise CaseError(
+            f"{path}: the disk is full; {len(waiting)} jobs were not started: free space, then "
+            "repeat the command, which runs only what is missing"
+        )
+
+
+def _end_with_parent() -> None:
+    """Ask the kernel for a SIGTERM when the parent dies, however it dies (PR_SET_PDEATHSIG)."""
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM, 0, 0, 0)
+
+
+# ------------------------------------------------------------------------------------------------
+# Snakemake, with the static Snakefile that comes with fdnet.
+
+
+SNAKEFILE = str(resources.files("fdnet.campaign").joinpath("Snakefile"))
+_CONFIG = f"{LOGS}/snakemake.json"
+_REASON = re.compile(
+    r"^(?!.*(?:check log file|Error in rule|Look above)).*(?:[Ee]rror|Exception|failed|locked).*$",
+    re.MULTILINE,
+)
+
+
+def has_snakemake() -> bool:
+    """Whether Snakemake is installed."""
+    return find_spec("snakemake") is not None
+
+
+def _run_snakemake(
+    path: Path, plan: Plan, tasks: Sequence[Task], how: HowToRun, lock: int, ended: Ended
+) -> None:
+    """Run what is missing as jobs of Snakemake, which cancels them when it is stopped by SIGINT.
+
+    Snakemake inherits the lock of the folder and its name stands in it, so that no other call
+    works there while it lives, also when this process is killed.
+    """
+    write_text(path / _CONFIG, json.dumps({"options": how.options}))
+    words, log = _snakemake_words(how, plan), _log(path, "snakemake")
+    if os.pread(lock, 1, 0) and any(path.glob(".snakemake/locks/*")):
+        how.say("an earlier Snakemake was killed here; its lock is removed")
+        _start([*words, "--unlock"], path, log).wait()
+    open_tasks = {task.name: path / task.makes for task in tasks}
+    process = _start(words, path, log, pass_fds=(lock,))
+    holder = f"Snakemake (process {process.pid} on {socket.gethostname()}) still runs the jobs of "
+    holder += f"this folder; wait for its end, or stop it with kill -INT -{process.pid}"
+    os.truncate(lock, 0)
+    os.pwrite(lock, holder.encode(), 0)
+    try:
+        over = False
+        while not over:
+            over = process.poll() is not None
+            for name in [name for name, made in open_tasks.items() if made.exists()]:
+                del open_tasks[name]
+                ended(name, 0)
+            time.sleep(PAUSE)
+    finally:
+        _stop([process], os.killpg, signal.SIGINT)
+        os.truncate(lock, 0)
+    if process.returncode and not any(last_words(_log(path, task.name)) for task in tasks):
+        lines = _REASON.findall(log.read_text("utf-8", "replace"))
+        reasons = " | ".join(dict.fromkeys(line.strip() for line in lines))[:1000]
+        raise CaseError(
+            f"{log}: Snakemake ended with exit code {process.returncode} before any run: "
+            f"{reasons or last_words(log)}"
+        )
+
+
+def _snakemake_words(how: HowToRun, plan: Plan) -> list[str]:
+    words = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--configfile", _CONFIG]
+    words += ["--until", "run", "--keep-going", "--rerun-incomplete"]
+    if how.engine == "snakemake":
+        return [*words, "--cores", str(how.jobs * plan.ranks)]
+    words += ["--executor", "slurm", "--jobs", str(how.jobs), "--latency-wait", "30"]
+    with contextlib.suppress(OSError):  # without accounting sacct would see no job end
+        if subprocess.run(["sacct", "-X"], capture_output=True, check=False).returncode:
+            words += ["--slurm-status-command", "squeue"]
+    quoted = [_quoted(one) for one in how.resources]
+    return words + (["--default-resources", *quoted] if quoted else [])
+
+
+def _quoted(resource: str) -> str:
+    """A resource for Snakemake, which reads it as Python: texts are quoted, `all` is no function.
+
+    Raises CaseError for one that is no name with a printable value.
+    """
+    name, _, value = resource.partition("=")
+    if not name.isidentifier() or not value.isprintable() or not value:
+        raise CaseError(
+            f"--slurm: {resource!r}, expected resources of Snakemake as slurm_partition=short,"
+            "runtime=60"
+        )
+    return resource if value.isdecimal() else f"{name}={value.strip(chr(39) + chr(34))!r}"
