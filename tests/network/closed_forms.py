@@ -88,7 +88,7 @@ def power_centre(corner: Array, radius: Array) -> tuple[Array, Array]:
 
 def disc_lens_area(first: Array, second: Array, apart: Array) -> Array:
     """Area (...) m2 common to discs of radius `first` and `second`, centres `apart` (...) m."""
-    a, b, d = np.broadcast_arrays(first, second, np.maximum(apart, 1e-300))
+    a, b, d = np.broadcast_arrays(first, second, np.maximum(apart, 1e-100))
     to_chord = (d**2 + a**2 - b**2) / (2.0 * d)
     chord = np.sqrt(np.maximum(a**2 - to_chord**2, 0.0))
     area = a**2 * np.arctan2(chord, to_chord) - to_chord * chord

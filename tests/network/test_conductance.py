@@ -129,7 +129,7 @@ def test_walls_that_hold_the_fluid_leave_less_of_it():
 
 
 def test_throats_that_walls_cut_are_grains_and_their_images():
-    """One wall: a grain, its image and another; along an edge of the box a grain and two images."""
+    """One wall: a grain, its image and another; an edge of the box: a grain and two images."""
     for name, made in PACKS.items():
         network = build_network(made(), periodic=NONE, walls="no-slip")
         order, place, part = wall_cuts(network)

@@ -58,7 +58,7 @@ def test_lattices_have_their_known_porosity_and_cells():
 
 
 def test_touching_spheres_leave_the_textbook_openings():
-    """Porosity 0.220364 and a sphere of 0.224745 between four, 0.161254 r2 and 0.1547 r of three."""
+    """Porosity 0.220364 and a sphere of 0.224745 of four, 0.161254 r2 and 0.1547 r of three."""
     network = build_network(face_centred(), periodic=ALL)
     four = network.pore_radius < 0.3
     assert network.pore_radius[four] == pytest.approx(np.sqrt(1.5) - 1, rel=1e-6)
