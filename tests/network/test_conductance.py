@@ -22,14 +22,12 @@ from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
 from fdnet.network.permeability import analyse
 from fdnet.network.states import cut_out
+from fdnet.network.stokes import extrapolate, solve_slab
 from fdnet.spheres.geometry import make_images
 from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.networks import network_of
 from tests.network.packs import body_centred, random_pack, simple_cubic, snapshot, with_fines
 from tests.network.sections import from_python, uneven_flux, wall_flux
-from validation.engine.csv_rows import read_named
-from validation.truth.packs import MM
-from validation.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
 
 ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
 PACKS = {
@@ -69,21 +67,20 @@ def test_a_body_centred_throat_by_the_formulas_on_paper():
         assert LAWS[law](network) == pytest.approx(by_hand, rel=1e-4), law
 
 
-def test_thin_slabs_of_grains_against_stokes():
-    """Planes that cut caps off grains."""
-    rows = {row["slab"]: row for row in read_named(SLAB_FOLDER / SLAB_TRUTH)}
-    for name, error in [
-        ("slabM_r5_ranges_cake", 0.07),
-        ("slabL_r10", 0.09),
-        ("slabE_r3", 0.05),
-        ("slabQ_r5_mu0_light", 0.03),
+def test_thin_slabs_against_resolved_stokes_flow():
+    """Between pressure planes that cut caps off grains, on two lattices each; nothing is fitted."""
+    for count, more, share, error in [
+        (30, {}, (0.2, 0.8), 0.03),
+        (30, {"spread": 0.3}, (0.2, 0.8), 0.03),
+        (30, {"spread": 0.3}, (0.35, 0.65), 0.055),
+        (60, {"aspect": 2.0}, (0.35, 0.65), 0.03),
     ]:
-        row = rows[name]
-        span = float(row["x_lo_mm"]) * MM, float(row["x_hi_mm"]) * MM
-        grains = read_specimen(SLAB_FOLDER / row["file"]).grains()
-        network = build_network(cut_out(grains, span, SIDES), periodic=SIDES)
+        pack = random_pack(count, **more)
+        span = tuple(part * pack.box[0, 1] for part in share)
+        exact = extrapolate(*(solve_slab(pack, span, cells=cells) for cells in (32, 48))).k
+        network = build_network(cut_out(pack, span, SIDES), periodic=SIDES)
         k = whole_permeability(network, 1.0 / half_resistances(network).sum(axis=1))[0]
-        assert k == pytest.approx(float(row["k0_mm2"]) * MM**2, rel=error), name
+        assert k == pytest.approx(exact, rel=error), (count, more, share)
 
 
 def test_the_cap_of_a_grain_that_a_face_cuts():

@@ -278,7 +278,7 @@ def test_fluxes_against_rational_arithmetic(period):
 
 
 def test_chains_and_groups_sixteen_decades_apart():
-    """Resistances add, and every link takes the same flux; parallel paths share as they conduct."""
+    """Resistances add, every link takes the same flux, parallel paths share as they conduct."""
     for g in (
         np.array([1e-16, 1.0, 1e-8, 1.0, 1e-16]),
         10.0 ** -np.array([0, 4, 8, 12, 16, 12, 8, 4, 0]),
