@@ -311,7 +311,7 @@ def test_what_a_column_counts_is_what_the_case_says(tmp_path):
     assert case_from(data, folder=tmp_path).grains.sizes.by == "number"
     for sizes["by"] in ("mass", "surface"):
         with pytest.raises(
-            CaseError, match="counts number, but the case says by '(mass|surface)'"
+            CaseError, match=r"counts number, but the case says by '(mass|surface)'"
         ):
             case_from(data, folder=tmp_path)
 
