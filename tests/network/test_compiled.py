@@ -113,7 +113,7 @@ def test_a_bad_or_foreign_cache_is_left_aside_and_made_anew(tmp_path):
 
 
 def test_a_cache_in_a_place_that_others_can_write_is_not_used(tmp_path):
-    """Code of somebody else must not be run: where ~/.cache cannot be written, a folder of ours."""
+    """Code of somebody else must not be run: with no ~/.cache a folder of ours."""
     (tmp_path / "program.py").write_text(SOURCE)
     (tmp_path / "cache").write_text("a file, so no folder for the cache")
     own = tmp_path / f"fdnet-{os.getuid()}"

@@ -1,4 +1,4 @@
-"""Fines in throats and pores: volumes against Monte Carlo, closed forms, sums and other packages."""
+"""Fines in throats and pores: volumes against points, closed forms, sums, another package."""
 
 from dataclasses import replace
 from itertools import pairwise

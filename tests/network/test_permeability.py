@@ -56,11 +56,12 @@ def test_renumbering_quarter_turn_mirror_scale_and_shift_leave_k(pack, walled, p
     small = replace(
         spheres, position=scale * place, radius=scale * spheres.radius, box=scale * box
     )
-    for laws in (THESIS, EFFECTIVE):
+    for laws in (THESIS, EFFECTIVE, ARCHIE):
         k = both(spheres, periodic, laws)
-        for name, other in others.items() if laws == EFFECTIVE else list(others.items())[:2]:
-            assert both(other, periodic, laws) == pytest.approx(k, rel=1e-5), (name, laws)
-        assert both(small, periodic, laws) == pytest.approx(k * scale**2, rel=1e-5), laws
+        error = 3e-4 if laws == ARCHIE else 1e-5
+        for name, other in others.items() if laws == EFFECTIVE else list(others.items())[:3]:
+            assert both(other, periodic, laws) == pytest.approx(k, rel=error), (name, laws)
+        assert both(small, periodic, laws) == pytest.approx(k * scale**2, rel=error), laws
 
 
 def test_a_box_may_start_anywhere(walled):

@@ -29,25 +29,6 @@ def triangle(a, b, c):
     return np.array([[0.0, 0.0], [a, 0.0], [x, np.sqrt(b * b - x * x)]])
 
 
-def each(function, *given):
-    return np.array([from_python(function)(*one) for one in zip(*given, strict=True)])
-
-
-def test_elementary_functions_are_those_of_the_c_library():
-    edges = [2.0**e * m for e in (-500, -1, 0, 1, 500) for m in (1.0, np.sqrt(0.5), 1.0 - 1e-15)]
-    x = np.concatenate([np.exp(np.linspace(-300.0, 300.0, 4001)), edges])
-    assert each(wedges.log_of, x) == pytest.approx(np.log(x), rel=5e-16, abs=5e-16)
-    x = np.linspace(-wedges.QUARTER, wedges.QUARTER, 4001)
-    assert each(wedges.sine_of, x) == pytest.approx(np.sin(x), rel=1e-15, abs=0.0)
-    assert each(wedges.cosine_of, x) == pytest.approx(np.cos(x), rel=0.0, abs=5e-16)
-    turn = np.linspace(-np.pi, np.pi, 4001)[1:]
-    size = np.exp(np.linspace(-30.0, 30.0, len(turn)))
-    axes = np.array([[0.0, 1.0], [1.0, 0.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 1.0], [-1.0, -1.0]])
-    y = np.concatenate([size * np.sin(turn), axes[:, 0]])
-    x = np.concatenate([size * np.cos(turn), axes[:, 1]])
-    assert each(wedges.angle_of, y, x) == pytest.approx(np.arctan2(y, x), rel=1e-15, abs=0.0)
-
-
 # ------------------------------------------------------------------------------------------------
 # Wedges and the rule of tubes.
 
