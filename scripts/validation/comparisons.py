@@ -109,8 +109,8 @@ def comparisons_of(
     return tuple(
         Comparison(
             name=part["name"],
-            full={_value(name): seeds for name, seeds in part["full"].items()},
-            quick={_value(name): seeds for name, seeds in part["quick"].items()},
+            full=dict(part["full"]),
+            quick=dict(part["quick"]),
             measure=measures[part["measure"]],
             judge=judges[part["judge"]] if "judge" in part else _by_lines(part["line"], exact),
             of=tuple(part.get("of", [part["name"]])),
@@ -122,7 +122,7 @@ def comparisons_of(
 def _by_lines(
     lines: Sequence[Mapping[str, Any]], exact: Mapping[str, Callable[[Any], float]]
 ) -> Judge:
-    return lambda rows: [found for line in lines for found in _worst(rows, line, exact)]
+    return lambda rows: [one for line in lines for one in _worst(rows, line, exact)]
 
 
 def _worst(
