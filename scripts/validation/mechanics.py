@@ -241,19 +241,18 @@ def _bonds(trial: Trial, normal: float, shear: float) -> dict[str, float]:
 # ---- The judges.
 
 
-def _means(rows: pd.DataFrame, quantity: str) -> "pd.Series[float]":
-    return rows[rows.quantity == quantity].groupby(["comparison", "value"])["observed"].mean()
-
-
 def _judge_moduli(rows: pd.DataFrame) -> list[Finding]:
-    young = _means(rows, "young")
-    if not len(young):
-        return []
-    most = young["moduli, periodic sides"].index.max()
+    """Young's modulus over that of the largest periodic cube."""
+    own = rows[rows.quantity == "young"]
+    young = {
+        (name, edge): float(own[(own.comparison == name) & (own.value == edge)].observed.mean())
+        for name, edge in sorted(set(zip(own.comparison, own.value, strict=True)))
+    }
+    most = max((edge for name, edge in young if "periodic" in name), default=0.0)
     lines = []
     for (name, edge), value in young.items():
-        share = value / young["moduli, periodic sides", most]
-        if edge < most and (name.startswith("moduli, walls") or edge == min(young.index)[1]):
+        share = value / young.get(("moduli, periodic sides", most), math.nan)
+        if edge < most and ("walls" in name or edge == min(edge for _, edge in young)):
             what = f"{name}: Young's, {edge:g} mm over {most:g} mm"
             lines.append(Finding(what, "1 ± 10 %", ITSELF, f"{share:.3f}", (share - 1) / 0.1))
     return lines

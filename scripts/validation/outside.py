@@ -568,8 +568,8 @@ def leaving_time(stiffness: float, shear: float, step: float, folder: Path) -> f
     """
     grain, fine, density, start = 5e-3, 2.5e-4, 2500.0, math.radians(1.0)
     zeta = math.log(2) / math.hypot(math.pi, math.log(2))
-    own = ("friction=0.5", f"damping_ratio={zeta!r}")
-    own = (*own, f"shear_stiffness_N_m={2 * shear * stiffness!r}", f"density_kg_m3={density}")
+    own = ["friction=0.5", f"damping_ratio={zeta!r}", f"density_kg_m3={density}"]
+    own += [f"shear_stiffness_N_m={2 * shear * stiffness!r}"]
     both = [f"{kind}.{part}" for kind in ("grains", "fines") for part in own]
     case = case_of(stiffness, *both, f"grains.radius_mm={1e3 * grain}", fine=fine)
     pull, height = (
