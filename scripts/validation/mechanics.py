@@ -80,6 +80,7 @@ def case_of(
 
 
 def moduli(trial: Trial, *, sides: str) -> dict[str, float]:
+    """Young's and shear modulus of one cube."""
     case = case_of(trial.seed, trial.value, sides)
     grains = packed(case, trial.folder.parent)
     result = elastic_of(grains, pack_material(case, grains), periodic=case.periodic).averaged
@@ -87,6 +88,7 @@ def moduli(trial: Trial, *, sides: str) -> dict[str, float]:
 
 
 def load_steps(trial: Trial, *, bonded: bool) -> dict[str, float]:
+    """Largest deviatoric stress, Pa, and volume strain of a test in so many load steps."""
     case = case_of(trial.seed, 1.9, "periodic")
     grains = packed(case, trial.folder.parent)
     material = replace(pack_material(case, grains), cement=CEMENT if bonded else None)
@@ -195,6 +197,7 @@ def unbonded(trial: Trial, *, liggghts: bool) -> dict[str, float]:
 
 
 def stress(trial: Trial, *, stiffness: float) -> dict[str, float]:
+    """Porosity and permeability under the stress of the trial, MPa."""
     case = case_of(trial.seed, 2.4, "periodic", stiffness)
     grains = packed(case, trial.folder.parent)
     if trial.value:
@@ -260,6 +263,7 @@ def judge_moduli(rows: pd.DataFrame) -> list[Finding]:
 
 
 def judge_steps(rows: pd.DataFrame) -> list[Finding]:
+    """The peak with fewer load steps over that with most."""
     peak = rows[rows.quantity == "peak"].groupby("value")["observed"].mean()
     if len(peak) < 2:
         return []
@@ -293,6 +297,7 @@ def judge_test(rows: pd.DataFrame) -> list[Finding]:
 
 
 def judge_stress(rows: pd.DataFrame) -> list[Finding]:
+    """Permeability at the largest stress over that without."""
     k = rows[rows.quantity == "k"].groupby("value")["observed"].mean()
     if len(k) < 2:
         return []
@@ -304,6 +309,7 @@ def judge_stress(rows: pd.DataFrame) -> list[Finding]:
 
 
 def judge_moved(rows: pd.DataFrame) -> list[Finding]:
+    """The largest displacement over the radius of a grain."""
     if rows.empty:
         return []
     moved, what = (

@@ -202,11 +202,9 @@ def held(trial: Trial) -> Seen:
         "drag": {"scheme": "viscous", "upstream": "interstitial", "pressure_gradient": False},
         "run": {"duration_ms": 5 * length, "checkpoint_ms": 0.25 * length},
     }
-    case, folder = (
-        with_fines(case_from(set_keys(tables, ["run.time_step_factor=0.2"]))),
-        trial.folder,
-    )
-    grains, scales = packed(case, folder.parent), invasion_scales(case)
+    case = with_fines(case_from(set_keys(tables, ["run.time_step_factor=0.2"])))
+    grains, scales = packed(case, trial.folder.parent), invasion_scales(case)
+    folder = trial.folder
     (folder / "post").mkdir(parents=True)
     alone = "neigh_modify delay 0\nneigh_modify exclude type 2 2"
     text = write_invade_inputs(case, scales, grains, folder, ranks=1).text
@@ -225,6 +223,7 @@ def held(trial: Trial) -> Seen:
 
 
 def judge_held(rows: pd.DataFrame) -> list[Finding]:
+    """Shares of all packs together with their bands (Clopper and Pearson 1934)."""
     lines = []
     for ratio, expected in ((7.0, "at most 1 %"), (5.0, "most of them")):
         sums = rows[rows.value == ratio].groupby("quantity")["observed"].sum()
@@ -373,6 +372,7 @@ def holes_of(rows: pd.DataFrame) -> dict[float, Clogging]:
 
 
 def judge_low(rows: pd.DataFrame) -> list[Finding]:
+    """Below and above three diameters at low friction, and the laws of clogs."""
     source, holes = "Marin and others 2018", holes_of(rows)
     below, above = rows[rows.value < 3], {r: one for r, one in holes.items() if r >= 3}
     stopped, free = int((below.quantity == CLOGGED).sum()), holes.get(2.75)
@@ -389,6 +389,7 @@ def judge_low(rows: pd.DataFrame) -> list[Finding]:
 
 
 def judge_high(rows: pd.DataFrame) -> list[Finding]:
+    """The range in which a flow stops and starts again, and the laws of clogs."""
     holes = holes_of(rows)
     wide = [one for r, one in holes.items() if r >= 3.03]
     seen = f"{sum(one.clogs for one in wide)} clogs in {sum(sum(o.counts) for o in wide):,} fines"
@@ -503,6 +504,7 @@ def resisted_gain(slope: float, resistance: float = 0.2) -> float:
 
 
 def slope(trial: Trial, *, settings: Sequence[str] = ()) -> Seen:
+    """Acceleration over g of a fine that started at rest, once it is steady."""
     stiffness, steps, step = 10.0, 20_000, contact_step(FINE, 10.0, 0.1)
     rough = [f"{key}=0.3" for key in ("grains.friction", "fines.friction", "box.wall_friction")]
     case = case_of(stiffness, *rough, *settings)
@@ -571,15 +573,10 @@ def leaving_time(stiffness: float, shear: float, step: float, folder: Path) -> f
     own += [f"shear_stiffness_N_m={2 * shear * stiffness!r}"]
     both = [f"{kind}.{part}" for kind in ("grains", "fines") for part in own]
     case = case_of(stiffness, *both, f"grains.radius_mm={1e3 * grain}", fine=fine)
-    pull, height = (
-        sphere_mass(fine, density) * GRAVITY,
-        contacts.groove_slope(fine / grain) * grain,
-    )
-    place = [
-        [-grain, 0, 0],
-        [grain, 0, 0],
-        [0, height * math.sin(start), height * math.cos(start)],
-    ]
+    pull = sphere_mass(fine, density) * GRAVITY
+    height = contacts.groove_slope(fine / grain) * grain
+    top = [0, height * math.sin(start), height * math.cos(start)]
+    place = [[-grain, 0, 0], [grain, 0, 0], top]
     box = np.array([[-3 * grain, 3 * grain]] * 2 + [[-3 * grain - 0.02 * GRAVITY, 3 * grain]])
     kinds = np.array([Kind.GRAIN, Kind.GRAIN, Kind.FINE])
     spheres = resting(np.array(place), np.array([grain, grain, fine]), box, kinds)
@@ -592,6 +589,7 @@ def leaving_time(stiffness: float, shear: float, step: float, folder: Path) -> f
 
 
 def neck(trial: Trial) -> Seen:
+    """When the fine leaves the neck with these contacts."""
     stiffness, shear, factor = NECKS[trial.value]
     step = factor * math.sqrt(sphere_mass(2.5e-4, 2500.0) / stiffness) or 1e-6
     return {"leaves after, s": leaving_time(stiffness, shear, step, trial.folder)}
