@@ -39,44 +39,35 @@ NETWORK_LAYERS = [
     ["permeability"],
     ["warm_up"],
 ]
-CAMPAIGN_LAYERS = [
-    ["plan"],
-    ["engine"],
-    ["result"],
-    ["until"],
-    ["page", "campaign"],
-    ["api"],
-]
+CAMPAIGN_LAYERS = [["plan"], ["engine", "result"], ["page"], ["api"]]
 ROOMS = {
     "fdnet": LAYERS,
     "fdnet.campaign": CAMPAIGN_LAYERS,
     "fdnet.network": NETWORK_LAYERS,
 }
 DOORS = {
-    "jinja2": {"dem/deck", "report/html", "campaign/engine", "campaign/page"},
+    "jinja2": {"dem/deck", "report/html", "campaign/page"},
     "subprocess": {
-        "campaign/engine/local",
-        "campaign/engine/snakemake",
+        "campaign/engine",
         "dem/liggghts",
         "network/warm_up",
         "report/picture",
         "spheres/vtk_file",
     },
-    "pandas": {"spheres/dump", "spheres/readers", "report/tables"},
+    "pandas": {"spheres/dump", "spheres/readers", "report/tables", "campaign/result"},
     "pyvista": {"report/vtk", "report/picture"},
     "vtkmodules": {"report/vtk", "spheres/vtk_file"},
     "imageio_ffmpeg": {"report/picture"},
     "openpnm": {"report/tables"},
-    "pyarrow": {"campaign/result/table"},
     "matplotlib": {
-        "campaign/page/figures",
+        "campaign/page",
         "report/figures",
     },
     "PIL": {"report/picture"},
     "numba": {"network/compiled"},
     "pymetis": {"network/flow/solver"},
     "pyamg": {"network/flow/solver"},
-    "pydantic": {"case", "report/tables", "run/folder", "campaign/plan/folder"},
+    "pydantic": {"case", "report/tables", "run/folder", "campaign/plan"},
     "tomli_w": {"case/case"},
     "rich": {"run/progress"},
 }

@@ -10,7 +10,7 @@ import pytest
 from builders import tiny, told
 
 import fdnet
-from fdnet.campaign.result.words import value_text
+from fdnet.campaign.page import value_text
 from fdnet.case.file import case_from
 from fdnet.case.tables import AnalysisChoices
 from fdnet.cli import main

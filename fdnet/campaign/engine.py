@@ -132,7 +132,8 @@ def _tasks_of(path: Path, plan: Plan, how: HowToRun) -> list[Task]:
             made = f"{folder}/{RECORDS['pack']}"
             if not (path / made).is_file():
                 after = f"pack-{digest}"
-                packs[after] = Task(after, [*start, "--out", folder, "--stages", "pack"], made)
+                pack = [*start, "--out", folder, "--stages", "pack"]
+                packs.setdefault(after, Task(after, pack, made))
         runs.append(Task(job.name, words, f"{RUNS}/{job.name}/{MANIFEST}", after))
     return [*packs.values(), *runs]
 

@@ -1,32 +1,32 @@
-"""Comparisons of made-up runs."""
+"""Run folders with made-up results, and what fdnet says of them."""
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fdnet.campaign.result.comparison import Comparison
-from fdnet.campaign.result.entry import Entry
-from fdnet.case.case import Case
+from builders import tiny
+
+import fdnet
+from fdnet import Case
 from fdnet.run.folder import OPTIONAL, OUTPUTS, digests_of, mark_folder
 
 
-def comparison(path: Path, values: dict, *, shared: bool = True, more: dict | None = None):
-    """Variants with a list of k_reduction by seed; `shared` gives runs of one seed one pack."""
-    entries = [
-        Entry(
-            name=f"{name}-seed-{seed}",
-            variant=name,
-            seed=seed,
-            keys={"fines.radius_mm": 0.01 * (number + 1)},
-            folder=path / "runs" / f"{name}-seed-{seed}",
-            pack=f"pack-{seed}" if shared else f"{name}-{seed}",
-            numbers={"k_reduction": value, **{k: v[seed] for k, v in (more or {}).items()}},
-        )
-        for number, (name, column) in enumerate(values.items())
-        for seed, value in enumerate(column)
-    ]
-    return Comparison(
-        title="made up", path=path, keys=("fines.radius_mm",), entries=tuple(entries)
-    )
+def compared(
+    path: Path, values: Mapping[str, Sequence[object]], quantity="k_reduction", *, shared=True
+):
+    """`fdnet.compare_runs` of variants with these values of a quantity, one of each seed from 1.
+
+    `shared` gives the runs of one seed one pack.
+    """
+    folders = []
+    for number, (name, column) in enumerate(values.items()):
+        key = "fines.count" if shared else "grains.count"
+        for seed, value in enumerate(column, start=1):
+            folder = path / "made" / f"{name}-{seed}"
+            case = tiny(f"name={name}", f"{key}={60 + number}", f"seed={seed}")
+            finished_run(folder, case, **{quantity: value})
+            folders.append(folder)
+    return fdnet.compare_runs(folders, out=path / "compared", ranked_by=quantity)
 
 
 def finished_run(folder: Path, case: Case, **numbers: object) -> None:

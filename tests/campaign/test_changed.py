@@ -2,28 +2,37 @@
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
 from builders import tiny
 from campaign.samples import finished_run
 
-from fdnet.campaign.plan.ensemble import ensemble_plan
-from fdnet.campaign.plan.folder import campaign_folder
+import fdnet
 from fdnet.cli import main
+from fdnet.errors import CaseError
 from fdnet.run.folder import digests_of
 
 BAD = "tiny-seed-2"
+VALUES = [0.30, 0.40, 0.50, 0.38, 0.42, 0.40, 0.41, 0.39, 0.40, 0.40]
 
 
-@pytest.fixture
-def ensemble(tmp_path) -> Path:
-    """The folder of an ensemble of three finished seeds, that lost 0.4, 0.5 and 0.6."""
-    out = tmp_path / "out"
-    (tmp_path / "tiny.toml").write_text(tiny().toml())
-    with campaign_folder(out, ensemble_plan(tiny(), 3)) as plan:
-        for job in plan.jobs:
-            finished_run(out / "runs" / job.name, job.case, k_reduction=0.3 + 0.1 * job.seed)
+def gather(folder: Path, *more: str) -> int:
+    """`fdnet ensemble --gather` of three seeds."""
+    folder.parent.mkdir(exist_ok=True)
+    case = folder.parent / "tiny.toml"
+    case.write_text(tiny().toml())
+    return main(["ensemble", str(case), "--seeds", "3", "--gather", "--out", str(folder), *more])
+
+
+@pytest.fixture(scope="module")
+def ensemble(tmp_path_factory) -> Path:
+    """The folder of an ensemble of three seeds, with the finished runs of ten."""
+    out = tmp_path_factory.mktemp("ensemble") / "out"
+    assert gather(out) == 5
+    for seed, value in enumerate(VALUES, start=1):
+        finished_run(out / f"runs/tiny-seed-{seed}", tiny(f"seed={seed}"), k_reduction=value)
     return out
 
 
@@ -69,38 +78,43 @@ SPOILT = {
 }
 
 
-@pytest.mark.parametrize("what", SPOILT)
-def test_a_changed_run_is_named_and_not_counted(ensemble, tmp_path, capsys, what):
-    name, spoil = SPOILT[what]
-    spoil(ensemble / "runs" / BAD / name)
-    case = str(tmp_path / "tiny.toml")
-    gather = ["ensemble", case, "--seeds", "3", "--gather", "--json", "--out", str(ensemble)]
-    assert main(gather) == 5
-    printed = capsys.readouterr()
-    summary = json.loads(printed.out)
-    assert (summary["done"], summary["failed"]) == (2, 1)
-    assert summary["failures"][0]["run"] == BAD
-    assert Path(name).name in summary["failures"][0]["reason"]
-    assert f"{BAD} failed: " in printed.err
-    assert summary["k_reduction"]["mean"] == pytest.approx(0.5)
-    assert summary["k_reduction"]["seeds"] == 2
-    for runs in ([ensemble], sorted((ensemble / "runs").iterdir())):
-        assert main(["compare", *map(str, runs), "--out", str(tmp_path / "c")]) == 2
-        assert Path(name).name in capsys.readouterr().err
-        assert not (tmp_path / "c").exists()
+def test_a_changed_run_is_named_and_not_counted(ensemble, tmp_path, capsys):
+    for number, (what, (name, spoil)) in enumerate(SPOILT.items()):
+        out, compared = tmp_path / str(number) / "out", str(tmp_path / "c")
+        shutil.copytree(ensemble, out)
+        spoil(out / "runs" / BAD / name)
+        capsys.readouterr()
+        assert gather(out, "--json") == 5, what
+        printed = capsys.readouterr()
+        summary = json.loads(printed.out)
+        assert (summary["done"], summary["failed"]) == (2, 1), what
+        assert summary["failures"][0]["run"] == BAD
+        assert Path(name).name in summary["failures"][0]["reason"], what
+        assert f"{BAD} failed: " in printed.err
+        assert summary["k_reduction"]["mean"] == pytest.approx(0.4)
+        assert summary["k_reduction"]["seeds"] == 2
+        for runs in ([out], sorted((out / "runs").iterdir())):
+            assert main(["compare", *map(str, runs), "--out", compared]) == 2, what
+            assert Path(name).name in capsys.readouterr().err
+            assert not Path(compared).exists()
 
 
 def test_a_run_without_a_result_is_left_out_with_a_word(ensemble, tmp_path, capsys):
-    (ensemble / "runs" / BAD / "manifest.json").unlink()
-    assert main(["compare", str(ensemble), "--json", "--out", str(tmp_path / "c")]) == 0
+    out = tmp_path / "out"
+    shutil.copytree(ensemble, out)
+    (out / "runs" / BAD / "manifest.json").unlink()
+    capsys.readouterr()
+    assert main(["compare", str(out), "--json", "--out", str(tmp_path / "c")]) == 0
     printed = capsys.readouterr()
-    assert json.loads(printed.out)["left_out"] == [str(ensemble / "runs" / BAD)]
+    assert json.loads(printed.out)["left_out"] == [str(out / "runs" / BAD)]
     assert f"{BAD}: has no result and is left out" in printed.err
 
 
-@pytest.mark.parametrize(
-    "spoil",
-    [
+def test_a_plan_of_another_shape_is_refused_in_one_line(ensemble, tmp_path, capsys):
+    good = (ensemble / "plan.json").read_text()
+    out = tmp_path / "out"
+    shutil.copytree(ensemble, out)
+    for spoil in (
         lambda path: path.write_text(""),
         lambda path: path.write_text("[]"),
         lambda path: path.write_bytes(b'{"name": "\xff"}'),
@@ -113,16 +127,57 @@ def test_a_run_without_a_result_is_left_out_with_a_word(ensemble, tmp_path, caps
         edited(runs=[{"name": "../../elsewhere", "variant": "tiny", "seed": 1}]),
         edited(runs=[]),
         edited(digest=float("nan")),
-    ],
-)
-def test_a_plan_of_another_shape_is_refused_in_one_line(ensemble, tmp_path, capsys, spoil):
-    spoil(ensemble / "plan.json")
-    case = str(tmp_path / "tiny.toml")
-    for command in (
-        ["ensemble", case, "--seeds", "3", "--gather", "--out", str(ensemble)],
-        ["compare", str(ensemble), "--out", str(tmp_path / "c")],
     ):
-        assert main(command) == 2
-        error = capsys.readouterr().err
-        assert error.startswith(f"fdnet: {ensemble / 'plan.json'}: ")
-        assert len(error.splitlines()) == 1
+        (out / "plan.json").write_text(good)
+        spoil(out / "plan.json")
+        capsys.readouterr()
+        for code in (gather(out), main(["compare", str(out), "--out", str(tmp_path / "c")])):
+            assert code == 2
+        lines = capsys.readouterr().err.splitlines()
+        assert len(lines) == 2
+        assert all(line.startswith(f"fdnet: {out / 'plan.json'}: ") for line in lines)
+
+
+def test_seeds_are_added_until_the_band_is_narrow(ensemble, tmp_path):
+    """Half bands of the first 3 and 6 values are 0.248 and t(5) sqrt(0.00416 / 6) = 0.0677.
+
+    Three seeds ask for 7 of a band of 0.1, and at most twice as many are taken at a time; percent
+    of a share are points. The runs are there already, so nothing is run.
+    """
+    for goal, most, seeds in (
+        ("k_reduction ± 25 %", 20, 3),
+        ("k_reduction +- 0.1", 20, 6),
+        ("k_reduction ± 10 %", 20, 6),
+        ("k_reduction ± 0.001 %", 8, 8),
+        ("k_damaged_m2 ± 10%", 20, 3),
+    ):
+        out = tmp_path / goal
+        shutil.copytree(ensemble, out)
+        made = fdnet.ensemble(tiny(), out=out, seeds=3, until=goal, max_seeds=most, engine="local")
+        row = made.summary["k_reduction"]
+        assert row["seeds"] == seeds, goal
+    shutil.copytree(ensemble, tmp_path / "six")
+    row = fdnet.ensemble(tiny(), out=tmp_path / "six", seeds=6).summary["k_reduction"]
+    assert row["high"] - row["mean"] == pytest.approx(2.570582 * (0.00416 / 6) ** 0.5)
+
+
+def test_seeds_are_added_by_the_whole_band(tmp_path):
+    """Of 0.02, 0.1 and 0.18 half a band is 0.199; what is left of it at 0 is half as wide."""
+    assert gather(tmp_path / "out") == 5
+    for seed, value in enumerate([0.02, 0.10, 0.18, 0.1, 0.1, 0.1], start=1):
+        finished_run(
+            tmp_path / f"out/runs/tiny-seed-{seed}", tiny(f"seed={seed}"), k_reduction=value
+        )
+    for goal, seeds in (("k_reduction ± 20 %", 3), ("k_reduction ± 19 %", 4)):
+        made = fdnet.ensemble(tiny(), out=tmp_path / "out", seeds=3, until=goal)
+        assert made.summary["done"] == seeds
+
+
+def test_a_goal_that_says_nothing_is_refused(ensemble, tmp_path):
+    for goal in ("k_reduction", "± 5 %", "k_reduction ± 0 %", "k ± x", ""):
+        with pytest.raises(CaseError, match="--until"):
+            fdnet.ensemble(tiny(), out=tmp_path / "none", until=goal)
+    shutil.copytree(ensemble, tmp_path / "out")
+    with pytest.raises(CaseError, match="did you mean k_reduction"):
+        fdnet.ensemble(tiny(), out=tmp_path / "out", seeds=3, until="k_reduce ± 5 %")
+    assert not (tmp_path / "none").exists()

@@ -1,87 +1,219 @@
-"""Engines: what fails stops nothing else, and what needs it waits."""
+"""What carries out the runs: a pool or Snakemake; stopped, killed, failing and on a full disk."""
 
+import os
+import re
+import signal
+import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
+from builders import tiny
 
-from fdnet.campaign.engine import local
-from fdnet.campaign.engine.local import run_local
-from fdnet.campaign.engine.snakemake import has_snakemake, run_snakemake
-from fdnet.campaign.engine.tasks import HowToRun, Task
-from fdnet.dem.liggghts import Binary, find_binary
-from fdnet.errors import CaseError, LiggghtsError
+import fdnet
+from fdnet.campaign import engine as engine_module
+from fdnet.campaign.engine import SNAKEFILE, has_snakemake
+from fdnet.cli import main
+from fdnet.errors import CaseError
 
-
-def tasks() -> list[Task]:
-    """`second` needs what `first` makes; `bad` fails."""
-    write = [
-        sys.executable,
-        "-c",
-        "import sys; open(sys.argv[1], 'w').write(open(sys.argv[2]).read())",
-    ]
-    first = "import time; time.sleep(0.3); open('one', 'w').write('made')"
-    return [
-        Task(name="second", words=(*write, "two", "one"), makes="two", after="first"),
-        Task(name="bad", words=(sys.executable, "-c", "raise SystemExit('no good')"), makes="x"),
-        Task(name="first", words=(sys.executable, "-c", first), makes="one"),
-    ]
+SNAKEMAKE = pytest.param(
+    *("snakemake", signal.SIGINT),
+    marks=pytest.mark.skipif(
+        not has_snakemake(), reason="Snakemake is not installed (pip install -e '.[dev]')"
+    ),
+)
+STAGES = ["--stages", "pack,invade,analyse"]
+VERSION = 'echo "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\n[ "$1" = -h ] && exit 0\n'
 
 
-@pytest.mark.parametrize("engine", ["local", "snakemake"])
-def test_jobs_wait_for_what_they_need_and_one_that_fails_stops_nothing(tmp_path, engine):
-    if engine == "snakemake" and not has_snakemake():
-        pytest.skip("Snakemake is not installed (pip install 'fdnet[sweep]')")
-    (tmp_path / "logs").mkdir()
-    ended: dict[str, int] = {}
-    if engine == "local":
-        run_local(tmp_path, tasks(), jobs=2, ended=ended.__setitem__)
-        assert ended.pop("bad") == 1
-    else:
-        how = HowToRun(jobs=2, engine="snakemake")
-        run_snakemake(tmp_path, tasks(), how, ranks=1, ended=ended.__setitem__)
-    assert ended == {"first": 0, "second": 0}
-    assert (tmp_path / "two").read_text() == "made"
-    assert "no good" in (tmp_path / "logs" / "bad.txt").read_text()
+def fake_liggghts(path: Path, text: str) -> str:
+    """A program that says it is LIGGGHTS and then does `text`."""
+    path.write_text(f"#!/bin/bash\n{VERSION}{text}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+def words(folder: Path, engine: str, *more: str) -> list[str]:
+    """The command line of an ensemble of two seeds in `folder`/out."""
+    (folder / "tiny.toml").write_text(tiny().toml())
+    words = ["ensemble", str(folder / "tiny.toml"), "--seeds", "2", "--out", str(folder / "out")]
+    return [*words, "--engine", engine, "--jobs", "2", *STAGES, *more]
+
+
+def started(folder: Path, engine: str, *more: str) -> subprocess.Popen:
+    """fdnet as a process of its own, once both runs have called LIGGGHTS, which then waits."""
+    mark = folder / "called"
+    fake = fake_liggghts(folder / "lmp", f"echo $$ >> '{mark}'\nexec sleep 100")
+    command = [sys.executable, "-m", "fdnet.cli", *words(folder, engine, "--liggghts", fake)]
+    process = subprocess.Popen([*command, *more], stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 60
+    while time.monotonic() < end and not (mark.exists() and len(mark.read_text().split()) == 2):
+        time.sleep(0.1)
+    assert len(mark.read_text().split()) == 2
+    return process
+
+
+def alive(folder: Path) -> list[int]:
+    """Processes of LIGGGHTS that are not ended yet, a little later."""
+    numbers = [int(word) for word in (folder / "called").read_text().split()]
+    end = time.monotonic() + 20
+    while any(map(_lives, numbers)) and time.monotonic() < end:
+        time.sleep(0.1)
+    return [number for number in numbers if _lives(number)]
+
+
+def _lives(number: int) -> bool:
+    try:
+        return Path(f"/proc/{number}/stat").read_text().split(") ")[1][0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.liggghts
+@pytest.mark.skipif(not has_snakemake(), reason="Snakemake is not installed")
+def test_one_call_of_snakemake_ends_by_itself_with_its_page(tmp_path, capsys):
+    """Two seeds through the real binary; a second call does nothing, by fdnet or by hand."""
+    out = tmp_path / "out"
+    assert main(words(tmp_path, "snakemake")) == 0
+    printed = capsys.readouterr()
+    assert printed.out.startswith("tiny: permeability lost ")
+    assert "2 of 2: tiny-seed-" in printed.err
+    for seed in (1, 2):
+        benchmark = (out / f"benchmarks/tiny-seed-{seed}.tsv").read_text().split()
+        assert {"max_rss", "cpu_time"} <= set(benchmark)
+    before = {p: p.stat().st_mtime_ns for p in out.glob("runs/*/manifest.json")}
+    assert main(words(tmp_path, "snakemake")) == 0
+    assert "to do" not in capsys.readouterr().err
+    page = (out / "compare.html").read_bytes()
+    (out / "compare.html").unlink()
+    by_hand = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--cores", "2"]
+    done = subprocess.run(by_hand, cwd=out, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (out / "compare.html").read_bytes() == page
+    assert {p: p.stat().st_mtime_ns for p in out.glob("runs/*/manifest.json")} == before
+
+
+@pytest.mark.parametrize(("engine", "number"), [("local", signal.SIGTERM), SNAKEMAKE])
+def test_a_stop_cancels_the_runs_and_ends_with_130(tmp_path, engine, number):
+    process = started(tmp_path, engine)
+    process.send_signal(number)
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "stopped; what was written is kept" in error
+    assert alive(tmp_path) == []
+
+
+def test_the_pool_dies_with_fdnet(tmp_path):
+    process = started(tmp_path, "local")
+    process.kill()
+    process.communicate()
+    assert alive(tmp_path) == []
+
+
+@pytest.mark.skipif(not has_snakemake(), reason="Snakemake is not installed")
+def test_a_snakemake_that_outlives_fdnet_is_named_and_no_seed_has_failed(tmp_path, capsys):
+    """fdnet is killed, then the Snakemake that it left behind; the next call takes over."""
+    process = started(tmp_path, "snakemake")
+    process.kill()
+    process.communicate()
+    assert main(words(tmp_path, "snakemake")) == 2
+    error = capsys.readouterr().err
+    match = re.search(
+        r"Snakemake \(process (\d+) on .* still runs the jobs .*kill -INT -\1", error
+    )
+    assert match, error
+    assert "failed" not in error
+    os.killpg(int(match[1]), signal.SIGKILL)
+    assert alive(tmp_path) == []
+    assert list((tmp_path / "out/.snakemake/locks").iterdir())
+    fake = fake_liggghts(tmp_path / "lmp", 'echo "ERROR: played"; exit 1')
+    assert main(words(tmp_path, "snakemake", "--liggghts", fake)) == 5
+    error = capsys.readouterr().err
+    assert "an earlier Snakemake was killed here; its lock is removed" in error
+    assert "tiny-seed-1 failed: " in error
+    assert "ERROR: played" in error
+
+
+@pytest.mark.skipif(not has_snakemake(), reason="Snakemake is not installed")
+def test_the_lock_of_another_snakemake_is_respected(tmp_path, capsys):
+    """One that fdnet did not start: its lock stands without a word in the lock of fdnet."""
+    assert main([*words(tmp_path, "snakemake"), "--gather"]) == 5
+    locks = tmp_path / "out/.snakemake/locks"
+    locks.mkdir(parents=True)
+    (locks / "0.output.lock").write_text("runs/tiny-seed-1/manifest.json\n")
+    capsys.readouterr()
+    fake = fake_liggghts(tmp_path / "lmp", "exit 1")
+    assert main(words(tmp_path, "snakemake", "--liggghts", fake)) == 2
+    error = capsys.readouterr().err
+    assert "Snakemake ended with exit code 1 before any run" in error
+    assert "locked" in error
+
+
+@pytest.mark.nightly
+@pytest.mark.skipif(not has_snakemake(), reason="Snakemake is not installed")
+def test_resources_reach_sbatch_as_they_are_and_its_reason_the_user(tmp_path, capsys, monkeypatch):
+    """A stand-in for sbatch keeps its words and refuses; nothing that a user names is run."""
+    pytest.importorskip("snakemake_executor_plugin_slurm")
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin/sbatch").write_text(
+        f"#!/bin/bash\nprintf '%s\\n' \"$@\" >> {tmp_path}/words\n"
+        "echo 'sbatch: error: invalid partition specified' >&2; exit 1\n"
+    )
+    for name in ("sacct", "squeue", "scontrol", "sinfo", "sacctmgr"):
+        (tmp_path / "bin" / name).write_text("#!/bin/bash\nexit 1\n")
+    for program in (tmp_path / "bin").iterdir():
+        program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}/bin:{os.environ['PATH']}")
+    fake = fake_liggghts(tmp_path / "lmp", "exit 1")
+    resources = "slurm_partition=all,runtime=10,mem_mb=500"
+    arguments = words(tmp_path, "auto", "--liggghts", fake, "--slurm", resources)
+    assert main(arguments) == 2
+    error = capsys.readouterr().err
+    assert "sbatch: error: invalid partition specified" in error
+    given = (tmp_path / "words").read_text()
+    assert re.search(r"-p\s+all\b", given)
+    assert re.search(r"--mem\s+500\b", given)
+
+
+def test_resources_that_are_no_words_are_refused(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(engine_module, "find_spec", lambda name: True)
+    fake = fake_liggghts(tmp_path / "lmp", "exit 1")
+    for bad in ("a\nb=1", "slurm_partition", "=3", "a b=1", "x=", "__import__('os')=1"):
+        arguments = words(tmp_path, "auto", "--liggghts", fake, "--slurm", bad)
+        assert main(arguments) == 2, bad
+        assert "--slurm: " in capsys.readouterr().err
+    assert main(words(tmp_path, "local", "--slurm", "runtime=1")) == 2
+    assert main(words(tmp_path, "local", "--jobs", "0")) == 2
+
+
+def test_a_run_that_is_killed_says_so_and_stops_no_other(tmp_path, capsys):
+    """LIGGGHTS of seed 1 kills the `fdnet run` that called it, that of seed 2 fails by itself."""
+    text = '[[ $PWD = *seed-1* ]] && kill -9 $PPID; echo "ERROR: played"; exit 1'
+    fake = fake_liggghts(tmp_path / "lmp", text)
+    assert main(words(tmp_path, "local", "--liggghts", fake)) == 5
+    error = capsys.readouterr().err
+    assert "tiny-seed-1 failed: ended by signal 9 (SIGKILL), perhaps for want of memory" in error
+    assert re.search(r"tiny-seed-2 failed: .*ERROR: played", error)
 
 
 def test_a_full_disk_starts_nothing_more(tmp_path, monkeypatch):
-    (tmp_path / "logs").mkdir()
     answers = iter([False, True])
-    monkeypatch.setattr(local, "disk_is_full", lambda folder: next(answers, True))
-    ended: dict[str, int] = {}
+    monkeypatch.setattr(engine_module, "disk_is_full", lambda folder: next(answers, True))
+    fake = fake_liggghts(tmp_path / "lmp", "exit 1")
     with pytest.raises(CaseError, match="disk is full; 2 jobs were not started"):
-        run_local(tmp_path, tasks()[::-1], jobs=1, ended=ended.__setitem__)
-    assert ended == {"first": 0}
+        fdnet.ensemble(tiny(), seeds=3, out=tmp_path / "out", jobs=1, liggghts=fake)
+    logs = [path.name for path in (tmp_path / "out/logs").glob("*.txt")]
+    assert logs == ["tiny-seed-1.txt"]
 
 
-def test_a_job_that_is_killed_says_so(tmp_path):
-    (tmp_path / "logs").mkdir()
-    kill = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
-    task = Task(name="killed", words=(sys.executable, "-c", kill), makes="x")
-    run_local(tmp_path, [task], jobs=1, ended=lambda name, code: None)
-    assert "ended by signal 9 (SIGKILL)" in (tmp_path / "logs/killed.txt").read_text()
-
-
-def test_a_launcher_takes_the_place_of_mpirun(tmp_path):
-    binary = Binary(
-        path=tmp_path / "lmp",
-        version="3.8.0",
-        launcher=None,
-        template=("srun", "-n", "{ranks}", "--mpi=pmix"),
-    )
-    words = ["srun", "-n", "8", "--mpi=pmix", str(tmp_path / "lmp"), "-in", "in.x"]
-    assert binary.command("in.x", 8)[: len(words)] == words
-    assert "srun" not in binary.command("in.x", 1)
-
-
-@pytest.mark.parametrize(
-    ("launcher", "kind", "message"),
-    [
-        ("mpirun -np 4", CaseError, "where the number of ranks goes"),
-        ("no-such-launcher -n {ranks}", LiggghtsError, "not on PATH"),
-        ("mpirun 'a {ranks}", CaseError, "quote it"),
-    ],
-)
-def test_a_bad_launcher_is_refused(launcher, kind, message):
-    with pytest.raises(kind, match=message):
-        find_binary(launcher=launcher)
+def test_what_stops_every_run_stops_before_anything_is_written(tmp_path, capsys):
+    for option, value, code, message in (
+        ("--launcher", "mpirun -np 4", 2, "where the number of ranks goes"),
+        ("--launcher", "no-such-launcher -n {ranks}", 3, "not on PATH"),
+        ("--launcher", "mpirun 'a {ranks}", 2, "quote it"),
+        ("--liggghts", str(tmp_path / "none"), 3, "none"),
+    ):
+        assert main(words(tmp_path, "local", option, value)) == code
+        assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

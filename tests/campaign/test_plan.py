@@ -1,13 +1,17 @@
-"""Sweep files, their plans, and the folder that keeps one plan."""
+"""Sweep files, their plans, the folder that keeps one plan, and targets of a design."""
+
+import json
+from pathlib import Path
 
 import pytest
 import tomli_w
 from builders import TINY, tiny
+from campaign.samples import finished_run
 
-from fdnet.campaign.plan.ensemble import ensemble_plan
-from fdnet.campaign.plan.folder import campaign_folder
-from fdnet.campaign.plan.job import shared_packs
-from fdnet.campaign.plan.sweep import plan_of, read_sweep
+import fdnet
+from fdnet import read_case
+from fdnet.campaign.plan import sweep_plan
+from fdnet.cli import main
 from fdnet.errors import CaseError
 
 GRID = """
@@ -22,109 +26,200 @@ fluid.viscosity = ["10 cP", "50 cP", "90 cP"]
 
 
 @pytest.fixture
-def written(tmp_path):
-    """Writes a sweep file with tiny.toml next to it, and reads it."""
+def write(tmp_path):
+    """Writes a sweep file with tiny.toml next to it; gives its path."""
     (tmp_path / "tiny.toml").write_text(tomli_w.dumps(TINY))
 
-    def write(text: str):
-        path = tmp_path / "sweep.toml"
-        path.write_text(text)
-        return read_sweep(path)
+    def write(text: str) -> Path:
+        (tmp_path / "sweep.toml").write_text(text)
+        return tmp_path / "sweep.toml"
 
     return write
 
 
-def test_a_grid_is_every_combination_with_every_seed(written):
-    plan = plan_of(written(GRID))
-    assert len(plan.jobs) == len({job.name for job in plan.jobs}) == 12
-    cases = {(j.case.fines.radius_mm, j.case.fluid.viscosity_cP, j.seed) for j in plan.jobs}
-    assert cases == {(r, v, s) for r in (0.04, 0.05) for v in (10, 50, 90) for s in (3, 5)}
-    assert {job.case.analysis.sections for job in plan.jobs} == {2}
-    assert plan.keys == ("fines.radius_mm", "fluid.viscosity")
+def planned(path: Path) -> tuple[dict, dict]:
+    """plan.json of a sweep that is not run, and its cases by run."""
+    out = path.parent / "out"
+    assert main(["sweep", str(path), "--out", str(out), "--gather", "--quiet"]) == 5
+    plan = json.loads((out / "plan.json").read_text())
+    return plan, {
+        row["name"]: read_case(out / f"cases/{row['name']}.toml") for row in plan["runs"]
+    }
 
 
-def test_runs_of_one_seed_share_their_pack(written):
-    """Fines and fluid are none of a pack's business."""
-    plan = plan_of(written(GRID))
-    assert {job.seed for job in shared_packs(plan.jobs).values()} == {3, 5}
+def test_a_grid_is_every_combination_with_every_seed(write):
+    """Fines and fluid are none of a pack's business: runs of one seed share theirs."""
+    plan, cases = planned(write(GRID))
+    seen = {(c.fines.radius_mm, c.fluid.viscosity_cP, c.seed) for c in cases.values()}
+    assert len(plan["runs"]) == len(cases) == 12
+    assert seen == {(r, v, s) for r in (0.04, 0.05) for v in (10, 50, 90) for s in (3, 5)}
+    assert {case.analysis.sections for case in cases.values()} == {2}
+    assert list(plan["variants"][0]["keys"]) == ["fines.radius_mm", "fluid.viscosity"]
+    packs = {(row["seed"], row["pack"]) for row in plan["runs"]}
+    assert len(packs) == 2
+    assert "" not in {pack for _, pack in packs}
 
 
-def test_named_variants_meet_every_case(written, tmp_path):
+def test_named_variants_meet_every_case(write, tmp_path):
     (tmp_path / "other.toml").write_text(tomli_w.dumps(TINY | {"name": "other"}))
-    plan = plan_of(
-        written(
+    plan, _ = planned(
+        write(
             'cases = ["tiny.toml", "other.toml"]\nseeds = 3\n'
             '[[variants]]\nname = "a/b"\nfines.count = 50\n[[variants]]\n"fines.count" = 60\n'
         )
     )
-    assert [one.name for one in plan.variants] == [
-        "tiny-a_b",
-        "tiny-count=60",
-        "other-a_b",
-        "other-count=60",
-    ]
-    assert plan.seeds == (1, 2, 3)
+    names = ["tiny-a_b", "tiny-count=60", "other-a_b", "other-count=60"]
+    assert [one["name"] for one in plan["variants"]] == names
+    assert plan["seeds"] == [1, 2, 3]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_bad_sweeps_are_refused_with_the_key(write):
+    names = ("'$(touch hit)'", "'a; b'", "'a b'", "''", '"\'"', "5", "'-x'", '"a\\ntouch hit"')
+    case, judge = 'case = "tiny.toml"\n', "[grid]\nfines.count = [1, 2]\n[judge]\n"
+    good = "reference = { fines.count = 1 }\n"
+    for text, message in (
         ("seeds = 2", "case: give one case file"),
-        ('case = "tiny.toml"\nsweeps = 1', "sweeps: unknown key"),
-        ('case = "tiny.toml"\nname = "a\\ntouch hit"', "name: .*expected letters, digits"),
-        *(
-            (f'case = "tiny.toml"\nname = {name}', "name: .*expected letters, digits")
-            for name in ("'$(touch hit)'", "'a; b'", "'a b'", "''", '"\'"', "5", "'-x'")
-        ),
-        ('case = "tiny.toml"\n[[variants]]\nname = "a\\nb"', "variants.name: .*one line"),
-        ('case = "tiny.toml"\n[[variants]]\nname = []', "variants.name: .*one line"),
-        ('case = "tiny.toml"\nseeds = 0', "seeds: 0"),
-        ('case = "tiny.toml"\nseeds = [1, 1]', "names a seed twice"),
-        ('case = "tiny.toml"\n[grid]\nfines.radius_mm = 0.05', "expected a list of values"),
-        ('case = "tiny.toml"\n[grid]\nseed = [1, 2]', "give seeds"),
+        (f"{case}sweeps = 1", "sweeps: unknown key"),
+        *((f"{case}name = {name}", "name: ") for name in names),
+        (f'{case}[[variants]]\nname = "a\\nb"', "variants.name: .*one line"),
+        (f"{case}[[variants]]\nname = []", "variants.name: .*one line"),
+        (f"{case}seeds = 0", "seeds: 0, expected"),
+        (f"{case}seeds = true", "seeds: True, expected"),
+        (f"{case}seeds = [1, 1]", "seeds: .*names a seed twice"),
+        (f"{case}[grid]\nfines.radius_mm = 0.05", "grid.fines.radius_mm: 0.05, .*list"),
+        (f"{case}[grid]\nfines.radius_mm = []", "grid.fines.radius_mm: "),
+        (f"{case}[grid]\nseed = [1, 2]", "give seeds"),
+        (f"{case}[[variants]]\nname = 'a'\nseed = 1", "give seeds"),
         ('case = "nowhere.toml"', "cannot be read"),
-        ('case = "tiny.toml"\n[grid]\nfines.radus_mm = [1]', "did you mean fines.radius_mm"),
-        ('case = "tiny.toml"\n[grid]\nfines.radius_mm = [0.05, -1]', "radius_mm=-1"),
+        (f"{case}[grid]\nfines.radus_mm = [1]", "did you mean fines.radius_mm"),
+        (f"{case}[grid]\nfines.radius_mm = [0.05, -1]", "radius_mm=-1"),
         (
-            'case = "tiny.toml"\n[grid]\nfines.count = [1]\n[set]\nfines.count = 2',
+            f"{case}[grid]\nfines.count = [1]\n[set]\nfines.count = 2",
             "stands in \\[grid\\] and in set",
         ),
         ("case = ", "not valid TOML"),
-    ],
-)
-def test_bad_sweeps_are_refused(written, text, message):
-    with pytest.raises(CaseError, match=message):
-        plan_of(written(text))
+        (f"{case}{judge}{good}", "judge.quantities: .*required"),
+        (f"{case}{judge}{good}knee = 3", "judge.knee: unknown key"),
+        (f"{case}{judge}{good}quantities = ['k_reducton']", "did you mean k_reduction"),
+        (f"{case}{judge}{good}quantities = ['sections.1.k_damged_m2']", "did you mean k_damaged"),
+        (
+            f"{case}{judge}reference = {{ fines.count = 3 }}\nquantities = ['k_reduction']",
+            "judge.reference: .* is no variant; the varied keys: fines.count",
+        ),
+    ):
+        with pytest.raises(CaseError, match=message):
+            fdnet.sweep(write(text), out=write(text).parent / "out")
+    assert not (write("").parent / "out").exists()
 
 
-def test_a_million_runs_are_refused_with_their_number(written):
+def test_a_judge_is_kept_with_the_plan(write):
+    """Its table stands in plan.json and decides nothing about what is run."""
+    judge = {"reference": {"fines.count": 40}, "quantities": ["k_reduction", "skin"]}
+    text = 'case = "tiny.toml"\n[grid]\nfines.count = [40, 80]\n'
+    plain, _ = planned(write(text))
+    plan, _ = planned(write(f"{text}{tomli_w.dumps({'judge': judge})}"))
+    assert plain["judge"] == {}
+    assert plan["judge"] == judge
+    assert plan["digest"] == plain["digest"]
+
+
+def test_a_million_runs_are_refused_with_their_number(write, capsys):
     values = list(range(1, 1001))
-    sweep = written(f'case = "tiny.toml"\nseeds = 1000\n[grid]\nfines.count = {values}')
-    with pytest.raises(CaseError, match=r"1,000,000 runs.*--jobs-limit 1000000"):
-        plan_of(sweep)
+    path = write(f'case = "tiny.toml"\nseeds = 1000\n[grid]\nfines.count = {values}')
+    assert main(["sweep", str(path), "--out", str(path.parent / "out")]) == 2
+    error = capsys.readouterr().err
+    assert "1,000,000 runs, more than 1,000" in error
+    assert "--jobs-limit 1000000" in error
 
 
-def test_a_folder_keeps_its_plan(tmp_path):
+def test_a_folder_keeps_its_plan(tmp_path, capsys):
     """More seeds extend it, another case does not fit, and seeds that are there stay."""
-    out = tmp_path / "out"
-    with campaign_folder(out, ensemble_plan(tiny(), 2)) as plan:
-        assert plan.seeds == (1, 2)
-        with (
-            pytest.raises(CaseError, match="another fdnet is running"),
-            campaign_folder(out, plan),
-        ):
-            pass
-    with campaign_folder(out, ensemble_plan(tiny(), 3)) as plan:
-        assert plan.seeds == (1, 2, 3)
-    with campaign_folder(out, ensemble_plan(tiny(), 1)) as plan:
-        assert plan.seeds == (1, 2, 3)
-    other = ensemble_plan(tiny("fines.count=299"), 2)
-    with pytest.raises(CaseError, match="holds another plan"), campaign_folder(out, other):
-        pass
+    case, out = tmp_path / "tiny.toml", tmp_path / "out"
+    case.write_text(tiny().toml())
+
+    def gather(*more: str, out=out) -> int:
+        return main(["ensemble", str(case), "--gather", "--quiet", "--out", str(out), *more])
+
+    for asked, seeds in (("2", [1, 2]), ("3", [1, 2, 3]), ("1", [1, 2, 3])):
+        assert gather("--seeds", asked) == 5
+        assert json.loads((out / "plan.json").read_text())["seeds"] == seeds
+    before = {path: path.stat().st_mtime_ns for path in out.glob("cases/*")}
+    assert gather("--seeds", "2") == 5
+    assert {path: path.stat().st_mtime_ns for path in out.glob("cases/*")} == before
+    assert gather("--set", "fines.count=299") == 2
+    assert "holds another plan" in capsys.readouterr().err
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("mine")
-    with (
-        pytest.raises(CaseError, match="holds no campaign"),
-        campaign_folder(tmp_path / "mine", other),
+    assert gather(out=tmp_path / "mine") == 2
+    assert "holds no campaign" in capsys.readouterr().err
+    assert gather(out=case) == 2
+    assert gather("--stages", "pack") == 2
+    assert "without analyse" in capsys.readouterr().err
+
+
+def designed(write, losses: dict[str, list[float]], targets: str, capsys, **more) -> dict:
+    """summary.json of `fdnet design` over made-up muds, with the printed lines as `lines`."""
+    muds = "".join(
+        f'[[variants]]\nname = "{name}"\nfines.count = {50 + number}\n'
+        for number, name in enumerate(losses)
+    )
+    seeds = len(next(iter(losses.values())))
+    path = write(f'case = "tiny.toml"\nseeds = {seeds}\n{muds}[targets]\n{targets}\n')
+    out = path.parent / "out"
+    arguments = ["design", str(path), "--gather", "--quiet", "--out", str(out)]
+    assert main(arguments) == 5
+    for row in json.loads((out / "plan.json").read_text())["runs"]:
+        case = read_case(out / f"cases/{row['name']}.toml")
+        index = row["seed"] - 1
+        numbers = {name: values[index] for name, values in more.items()}
+        loss = losses[row["variant"]][index]
+        finished_run(out / "runs" / row["name"], case, k_reduction=loss, **numbers)
+    capsys.readouterr()
+    assert main(arguments) == 0
+    lines = capsys.readouterr().out.splitlines()
+    return json.loads((out / "summary.json").read_text()) | {"lines": lines}
+
+
+def test_muds_are_ranked_by_their_bands(write, capsys):
+    """Four seeds with s = 0.01: half a band is 3.182 s / 2 = 0.016 about each mean.
+
+    t(n-1) 0.01 / sqrt(n) <= 0.01 first at n = 7: t(6) = 2.447 < 2.646.
+    """
+    around = [-0.01, -0.01, 0.01, 0.01]
+    losses = {
+        name: [mean + x * 0.75**0.5 for x in around]
+        for name, mean in (("bad", 0.5), ("close", 0.29), ("good", 0.1))
+    }
+    made = designed(write, losses, 'k_loss = "30 %"', capsys)
+    states = [(mud["name"], mud["state"]) for mud in made["design"]]
+    assert states == [("good", "met"), ("close", "open"), ("bad", "missed")]
+    assert made["targets"] == {"k_loss": pytest.approx(0.3)}
+    assert made["lines"][0].startswith("1. good meets every target: permeability lost 10 %")
+    assert "some 7 seeds would decide it" in made["lines"][1]
+    assert "1. good meets every target" in (write("").parent / "out/compare.html").read_text()
+
+
+def test_bridging_is_the_share_that_passes(write, capsys):
+    more = {"passed_count": [1, 3], "supplied_count": [100, 100]}
+    targets = 'bridging = "1 %"\ndepth = "500 um"\nk_loss = "30 %"'
+    made = designed(write, {"mud": [0.1, 0.2]}, targets, capsys, **more)
+    assert "pass through the specimen unbridged 2 % (95 %" in made["lines"][0]
+    assert made["targets"] == pytest.approx({"depth": 5e-4, "k_loss": 0.3, "bridging": 0.01})
+
+
+def test_bad_targets_are_refused(write, capsys):
+    for targets, message in (
+        ("", "targets: missing"),
+        ("cost = 3", "targets.cost: unknown"),
+        ("depth = '5 kg'", "targets.depth"),
     ):
-        pass
+        path = write(f'case = "tiny.toml"\n[targets]\n{targets}')
+        assert main(["design", str(path), "--out", str(path.parent / "out")]) == 2
+        assert message in capsys.readouterr().err
+
+
+def test_the_shipped_design_plans_three_muds_in_eight_packs(root):
+    plan = sweep_plan(root / "cases/sweeps/bridging.toml")
+    diameters = [round(2e6 * v.case.fines.mean_radius_m) for v in plan.variants]
+    assert diameters == [30, 60, 100]
+    assert (len(plan.jobs), len(set(plan.packs.values()))) == (24, 8)

@@ -45,8 +45,12 @@ def rows(path: Path) -> list[dict[str, str]]:
 
 
 def test_the_table_has_every_run_and_number(swept):
+    """Its columns: the run, its variant, the varied keys, seed, status, reason, and numbers."""
     out, code = swept
     assert code == 5
+    columns = list(rows(out / "table.csv")[0])
+    assert columns[:5] == ["run", "variant", "fines.count", "run.max_hours", "seed"]
+    assert columns[5:8] == ["status", "reason", "folder"]
     table = {row["run"]: row for row in rows(out / "table.csv")}
     assert len(table) == 6
     for name, row in table.items():

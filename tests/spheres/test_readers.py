@@ -12,7 +12,7 @@ import pytest
 import pyvista as pv
 
 from fdnet import read_case, read_spheres
-from fdnet.campaign.plan.sweep import read_sweep
+from fdnet.campaign.plan import sweep_plan
 from fdnet.case.file import read_size_file
 from fdnet.cli import main
 from fdnet.dem.liggghts import Launch, run_deck
@@ -530,7 +530,7 @@ def test_only_ordinary_files_of_bounded_size_are_read(tmp_path_factory):
             for read in (
                 lambda one: read_spheres(one, units="mm"),
                 read_case,
-                read_sweep,
+                sweep_plan,
                 lambda one: read_size_file(folder, str(one)),
             ):
                 with pytest.raises((CaseError, ValueError)):
