@@ -20,8 +20,8 @@ from fdnet.case.case import (
 from fdnet.case.file import case_from, known_keys, read_case, set_keys
 from fdnet.errors import CaseError
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
-from validation.thesis.runs.carry_out import find_state, state_path
-from validation.thesis.runs.plan import SPECIMENS, VARIANTS, planned
+from validation.thesis.published import SPECIMENS
+from validation.thesis.runs import VARIANTS, find_state, planned
 
 
 def problems(data: dict) -> str:
@@ -286,10 +286,9 @@ def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
 def test_stored_states_still_belong_to_their_cases(root: Path):
     """`find_state` raises when a state belongs to another case than that of its run."""
     states = root / "docs/thesis/states"
-    stored = [item for item in planned(quick=False) if state_path(states, item).exists()]
+    stored = [item for item in planned() if (states / item.file).exists()]
     assert len(stored) == len(list(states.glob("*-seed*.npz"))) > 20
-    for item in stored:
-        assert find_state(states, item, item.load()) is not None
+    assert all(find_state(states, item) is not None for item in stored)
 
 
 def test_values_in_si_are_those_of_the_keys():
