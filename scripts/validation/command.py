@@ -28,8 +28,6 @@ STUDIES: Mapping[str, str] = {
 OF_NETWORK = ("linear-solver", "laws", "velocity-field", "specimen-size")
 """The studies of the network half; the others are of the invasion."""
 
-THESIS = "thesis"
-"""A further study, of runs and figures rather than of error against run time."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,21 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out", type=path_option, help="folder for table, figure and text (default studies/NAME)"
     )
     parser.add_argument("--silent", action="store_true", help="no progress")
-    thesis = parser.add_argument_group(
-        "only for 'thesis', all specimens of the thesis next to its numbers"
-    )
-    thesis.add_argument("--jobs", type=int, default=1, help="runs side by side (default 1)")
-    thesis.add_argument(
-        "--runs",
-        type=path_option,
-        default=Path("runs/thesis"),
-        help="run folders while they are needed",
-    )
-    thesis.add_argument(
-        "--redraw",
-        action="store_true",
-        help="run nothing: tables and figures from the states kept",
-    )
+    parser.add_argument("--redraw", action="store_true", help="of 'page': draw its figures anew")
 
 
 def main(arguments: list[str]) -> int:
@@ -86,10 +70,7 @@ def run(options: argparse.Namespace) -> int:
     if options.name == "list":
         for name, question in STUDIES.items():
             print(f"{name:<18} {question}")
-        print(f"{THESIS:<18} all specimens of the thesis at full scale, next to its numbers")
         return 0
-    if options.name == THESIS:
-        return _run_thesis(options)
     refuse_folder_name(options.out or Path())
     study = study_named(options.name)
     out = options.out or Path("studies") / (f"{study.name}-quick" if options.quick else study.name)
@@ -97,27 +78,6 @@ def run(options: argparse.Namespace) -> int:
     print(text)
     for name, ending in (("table", "csv"), ("figure", "png"), ("text", "md")):
         print(f"{name + ':':<8}{out / study.name}.{ending}")
-    return 0
-
-
-def _run_thesis(options: argparse.Namespace) -> int:
-    from validation.thesis.command import ThesisOptions, run_thesis
-
-    refuse_folder_name(options.runs)
-    refuse_folder_name(options.out or Path())
-    if options.jobs < 1:
-        raise CaseError(f"--jobs: {options.jobs} runs side by side, expected at least 1")
-    out = options.out or Path("studies/thesis-quick" if options.quick else "docs/thesis")
-    asked = ThesisOptions(
-        out=out,
-        runs=options.runs,
-        quick=options.quick,
-        jobs=options.jobs,
-        redraw=options.redraw,
-        show=not options.silent,
-    )
-    print(run_thesis(asked))
-    print(f"tables and figures: {out}")
     return 0
 
 
