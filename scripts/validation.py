@@ -18,7 +18,7 @@ CHAPTERS: dict[str, str] = {}
 
 All other names are studies of error against run time.
 """
-STUDIES = "validation.command"
+STUDIES = "validation.study"
 
 
 def main(arguments: Sequence[str]) -> int:

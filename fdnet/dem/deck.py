@@ -46,15 +46,16 @@ class Deck(NamedTuple):
     left_out: tuple[LeftOut, ...]
 
 
-def _source(name: str) -> str | None:
-    entry = files("liggghts_templates") / name
+def _source(name: str, folder: Path | None) -> str | None:
+    own = folder / name if folder is not None else None
+    entry = own if own is not None and own.is_file() else files("liggghts_templates") / name
     return entry.read_text(encoding="utf-8") if entry.is_file() else None
 
 
 @cache
-def _environment() -> jinja2.Environment:
+def _environment(folder: Path | None) -> jinja2.Environment:
     return jinja2.Environment(
-        loader=jinja2.FunctionLoader(_source),
+        loader=jinja2.FunctionLoader(lambda name: _source(name, folder)),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -64,28 +65,28 @@ def _environment() -> jinja2.Environment:
 
 
 @cache
-def used_variables(template: str) -> frozenset[str]:
+def used_variables(template: str, folder: Path | None = None) -> frozenset[str]:
     """Names the template and everything it includes take from outside."""
-    source = _source(template)
+    source = _source(template, folder)
     if source is None:
         raise DeckError(f"liggghts_templates/{template}: template not found; reinstall fdnet")
-    tree = _environment().parse(source)
-    parts = [used_variables(name) for name in meta.find_referenced_templates(tree) if name]
+    tree = _environment(folder).parse(source)
+    parts = [used_variables(name, folder) for name in meta.find_referenced_templates(tree) if name]
     return frozenset(meta.find_undeclared_variables(tree)).union(*parts)
 
 
-def render_text(template: str, variables: dict[str, Any]) -> str:
-    """The template with `variables` put in.
+def render_text(template: str, variables: dict[str, Any], *, folder: Path | None = None) -> str:
+    """The template with `variables` put in; one of `folder` comes before a shipped one.
 
     Raises DeckError: a template or variable is missing, or a variable is offered but never used.
     """
-    unused = set(variables) - used_variables(template)
+    unused = set(variables) - used_variables(template, folder)
     if unused:
         raise DeckError(
             f"{template}: variables offered but never used: {', '.join(sorted(unused))}"
         )
     try:
-        return _environment().get_template(template).render(variables)
+        return _environment(folder).get_template(template).render(variables)
     except jinja2.UndefinedError as error:
         raise DeckError(f"{template}: {error.message}; expected a value from fdnet.dem") from error
     except jinja2.TemplateSyntaxError as error:
