@@ -145,7 +145,8 @@ def judged(rows: pd.DataFrame, rules: Sequence[Rule]) -> pd.DataFrame:
                 if rule.size:
                     size = errors.assign(error=errors.error.abs(), shift=0.0)
                     new = {"error": size.error, "band": _bands(done, size)}
-                    sizes.append(done.assign(quantity=rule.size.format(name), **new))
+                    sized = done.assign(quantity=rule.size.format(name), **new)
+                    sizes.append(sized[sized.error.notna()])
     return pd.concat([kept, *sizes], ignore_index=True)
 
 
@@ -155,7 +156,7 @@ def among(name: str, patterns: Sequence[str]) -> bool:
 
 
 def _named(names: pd.Series, patterns: Sequence[str]) -> pd.Series:
-    return names.map(lambda name: among(name, patterns)).astype(bool)
+    return names.isin([name for name in names.unique() if among(name, patterns)])
 
 
 def _errors(done: pd.DataFrame, rule: Rule, asked: pd.DataFrame) -> pd.DataFrame:
@@ -189,8 +190,8 @@ def _reference(done: pd.DataFrame, rule: Rule, asked: pd.DataFrame) -> pd.Series
     """Which of the runs are those of the reference."""
     for series in rule.reference_series or ("*",):
         for value in rule.reference:
-            best = pd.Series([same_value(one, value) for one in done.value], index=done.index)
-            best &= _named(done.series, (series,))
+            same = [one for one in done.value.unique() if same_value(one, value)]
+            best = done.value.isin(same) & _named(done.series, (series,))
             if best.any():
                 return best
     why = "; ".join(sorted(set(asked.status) - {DONE})[:3]) or "none was asked for"
@@ -273,7 +274,7 @@ def percent(level: Level) -> str:
 
 def verdict(level: Level) -> str:
     """What the seeds show: nothing where the band is larger than the error."""
-    if level.resolved or level.runs < 2:
+    if level.resolved or level.runs < 2 or level.error == 0.0:
         return ""
     needed = level.seeds_needed
     would = f"{needed} would" if needed else f"more than {_MOST_SEEDS:,} would"

@@ -21,12 +21,13 @@ module `measure`, which returns numbers by name. Both end as rows of the table o
 """
 
 import argparse
+import ctypes
 import itertools
 import json
 import resource
+import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -118,15 +119,18 @@ def measured(study: Study, out: Path, report: Callable[[str], None]) -> Iterator
     """The rows of all points. Points that `out` already has are not measured again."""
     path, work = out / POINTS, out / "work"
     work.mkdir(parents=True, exist_ok=True)
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    known = {key: found for key, found in map(json.loads, lines) if found["status"] == judge.DONE}
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    lines, cut = text.splitlines(), not text.endswith("\n") and bool(text)
+    whole = [json.loads(line) for line in lines if line.endswith("]")]
+    known = {key: found for key, found in whole if found["status"] == judge.DONE}
     points = points_of(study)
     for number, point in enumerate(points, 1):
         key = json.dumps(point)
         if key not in known:
             known[key] = _attempt(study, point, work)
             with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps([key, known[key]]) + "\n")
+                file.write("\n" * cut + json.dumps([key, known[key]]) + "\n")
+            cut = False
             report(f"{number} of {len(points)}: {point.series}, {point.value}")
         yield from rows_of_point(point, known[key])
 
@@ -187,6 +191,10 @@ def _processors() -> float:
 def swept(study: Study, out: Path, *, jobs: int | None, show: bool) -> Iterator[dict[str, Any]]:
     """The rows of all runs of the sweep. Runs that `out` already has are not run again."""
     data = dict(study.data) | {"case": str(FOLDER / study.data["case"])}
+    names = {f"v{n}": one["name"] for n, one in enumerate(data.get("variants", ()))}
+    if names:  # the campaign changes a name that no file can have
+        given = zip(names, data["variants"], strict=True)
+        data["variants"] = [{**one, "name": name} for name, one in given]
     path = out / "sweep.toml"
     write_text(path, tomli_w.dumps({key: data[key] for key in SWEEP if key in data}))
     stages = ("pack", "invade", "analyse")
@@ -194,15 +202,15 @@ def swept(study: Study, out: Path, *, jobs: int | None, show: bool) -> Iterator[
     numbers = runs.rename(columns=lambda name: name.replace(".", "_"))
     observed = {name: numbers.eval(text) for name, text in study.data["quantities"].items()}
     for place, run in runs.iterrows():
-        yield from rows_of_run(study, run, {name: one[place] for name, one in observed.items()})
+        name = names.get(run["variant"].split("+")[0], study.data.get("series", ""))
+        numbers_of_run = {quantity: one[place] for quantity, one in observed.items()}
+        yield from rows_of_run(study, name, run, numbers_of_run)
 
 
 def rows_of_run(
-    study: Study, run: Mapping[str, Any], observed: Mapping[str, float]
+    study: Study, name: str, run: Mapping[str, Any], observed: Mapping[str, float]
 ) -> Iterator[dict[str, Any]]:
-    """The rows of one run of the sweep, given as a row of the campaign's table."""
-    named = "variants" in study.data
-    name = run["variant"].split("+")[0] if named else study.data["series"]
+    """The rows of one run of the variant `name`, given as a row of the campaign's table."""
     series, _, value = name.partition(": ")
     knob = study.data.get("knob", "variant")
     done = run["status"] == judge.DONE
@@ -321,6 +329,7 @@ def _answer(*, draw: bool) -> int:
 
 def _isolated(name: str, work: str, point: str) -> None:
     """Prints what one point found, with limited memory; for a process of its own."""
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)  # it ends with the study
     resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
     print(json.dumps(measure_point(read_study(name), Point(*json.loads(point)), Path(work))))
 

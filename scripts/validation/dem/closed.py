@@ -27,6 +27,8 @@ from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from validation.dem.runs import the_binary
 
+TEMPLATES = Path(__file__).parents[1] / "templates"
+"""Folder of the decks that only comparisons use."""
 _EXACT = "%d %d " + " ".join(["%.17g"] * 7)
 
 
@@ -100,6 +102,7 @@ def _deck(case: Case, scales: Scales, start: Snapshot, watch: Watch) -> str:
             "dump_columns": COLUMNS,
             "dump_format": _EXACT,
         },
+        folder=TEMPLATES,
     )
 
 

@@ -21,8 +21,7 @@ from validation.dem.closed import (
     restitution_of,
     spring_energy,
 )
-from validation.dem.runs import grains_of, slab_case
-from validation.engine.runner import child_core_seconds
+from validation.dem.runs import child_core_seconds, grains_of, slab_case
 
 SPEED = 5.0
 """Closing speed of the two fines, m/s: about the fluid's velocity in the studies' invasion."""

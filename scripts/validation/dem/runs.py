@@ -5,16 +5,16 @@ They use fdnet's own decks and the real LIGGGHTS.
 
 import math
 import re
+import resource
 import shutil
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase, with_fines
-from fdnet.case.file import case_from, set_keys
+from fdnet.case.file import read_case
 from fdnet.dem.checkpoint import Checkpoints, state_at
 from fdnet.dem.deck import snapshot_of, specimen_box
 from fdnet.dem.invade_deck import write_invade_inputs
@@ -22,68 +22,20 @@ from fdnet.dem.invasion import InvadeStage, Invasion, invade
 from fdnet.dem.liggghts import Binary, Execution, Launch, find_binary, run_deck
 from fdnet.dem.packing import make_pack
 from fdnet.files import write_text
-from fdnet.names import SECTION_ARCHIE
-from fdnet.network.permeability import analyse
 from fdnet.scales.clock import relaxation_time
 from fdnet.scales.scales import invasion_scales, scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
-from validation.engine.runner import child_core_seconds
 
-SLAB: dict[str, Any] = {
-    "name": "study",
-    "box": {"size_mm": [4.0, 2.86, 2.86], "sides": "walls", "wall_friction": 0.0},
-    "grains": {"radius_mm": 0.25, "count": 300, "shear_stiffness_N_m": 34.0e9},
-    "fines": {
-        "radius_mm": 0.05,
-        "count": 1000,
-        "shear_stiffness_N_m": 26.0e9,
-        "supply": "slab",
-    },
-    "fluid": {"darcy_length_mm": 8.0},
-    "drag": {"upstream": "interstitial", "scheme": "viscous", "pressure_gradient": False},
-    "run": {"duration_ms": 2.0, "time_step_factor": 0.1},
-    "analysis": {"sections": 4},
-}
-"""The invasion of the studies: 300 fixed grains at porosity 0.40, 1,000 fines of 0.10 mm, 2 ms.
-
-The velocity (5.4 m/s) and the shear stiffnesses are those of the thesis's specimen 5. The duration
-is given, so that every run follows the same span of time. Drag has no error of its own (see the
-study of drag).
-"""
-PROFILE_BINS = 16
-"""Equal bins of depth over the specimen in which invaded fines are counted."""
-BINS = tuple(f"bin_{number:02d}" for number in range(PROFILE_BINS))
-OBSERVED = ("invaded", "mean_depth", "porosity_loss", "k_ratio_first")
-"""The results of an invasion that most studies compare."""
+SLAB = Path(__file__).parents[1] / "studies" / "slab.toml"
+"""The case of the invasions of the studies."""
 HELD_STEPS = 20
 """Steps for which held drag is held in relaxation_run."""
-_SMALL: dict[str, Any] = {
-    "grains": {"count": 60},
-    "box": {"size_mm": [2.4, 1.7, 1.7]},
-    "fines": {"count": 120},
-}
 
 
-def base_inputs() -> str:
-    """The case that all invasions of the studies start from, as text.
-
-    A record of points is continued only with the same case.
-    """
-    return slab_case(1).toml()
-
-
-def slab_case(seed: int, *assignments: str, small: bool = False) -> InvasionCase:
-    """The studies' invasion with other settings, "key=value".
-
-    `small` is a fifth of it, for the quick forms.
-    """
-    data = {key: dict(value) if isinstance(value, dict) else value for key, value in SLAB.items()}
-    if small:
-        for part, values in _SMALL.items():
-            data[part] |= values
-        data["run"] |= {"duration_ms": 0.5}
-    return with_fines(case_from(set_keys(data, [f"seed={seed}", *assignments])))
+def slab_case(seed: int, *assignments: str) -> InvasionCase:
+    """The studies' invasion with other settings, "key=value"."""
+    return with_fines(read_case(SLAB, assignments=[f"seed={seed}", *assignments]))
 
 
 @cache
@@ -105,13 +57,6 @@ def grains_of(case: Case, work: Path) -> Snapshot:
     return snapshot_of(read_frame(folder / "post" / "pack.dump"), plain, time_s=0.0)
 
 
-def invasion_run(case: InvasionCase, work: Path, slug: str) -> dict[str, float]:
-    """One invasion: counts, depths (m), profile, porosity, k, largest overlap, costs."""
-    grains = grains_of(case, work)
-    result, costs = _fresh(case, grains, work / slug)
-    return invasion_observed(case, grains, result) | costs
-
-
 def window_run(case: InvasionCase, work: Path, slug: str) -> dict[str, float]:
     """One invasion without its permeability: count and mean depth (m) of the fines, and costs."""
     result, costs = _fresh(case, grains_of(case, work), work / slug)
@@ -119,6 +64,12 @@ def window_run(case: InvasionCase, work: Path, slug: str) -> dict[str, float]:
         "invaded": float(result.history[-1].invaded),
         "mean_depth": _mean(_depths(case, result)),
     } | costs
+
+
+def child_core_seconds() -> float:
+    """CPU seconds, user and system, of the children this process has waited for."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def _fresh(
@@ -158,40 +109,6 @@ def edited_run(
     return run_deck(folder, "in.invade", replace(launch, follow=stage.keeper()))
 
 
-def invasion_observed(case: InvasionCase, grains: Snapshot, result: Invasion) -> dict[str, float]:
-    """Numbers of a finished invasion, SI; `bin_00`... are invaded fines by equal bins of depth.
-
-    "grain_shift" is the root-mean-square displacement of the grains since they were packed, over
-    their radius.
-    """
-    last, depth = result.history[-1], _depths(case, result)
-    bins = np.histogram(depth, PROFILE_BINS, (0.0, case.size_m[0]))[0]
-    analysis = analyse(
-        grains,
-        result.damaged,
-        periodic=case.periodic,
-        sections=case.analysis.sections,
-        walls=case.analysis.walls,
-        damage_law=SECTION_ARCHIE,
-    )
-    first = analysis.sections[0]
-    return {
-        "invaded": float(last.invaded),
-        "passed": float(last.passed),
-        "mean_depth": _mean(depth),
-        "depth_p95": analysis.invasion_depth_p95,
-        "count_first": float(first.fines_count),
-        "porosity_initial": analysis.porosity_initial,
-        "k_initial": analysis.k_initial,
-        "porosity_loss": analysis.porosity_initial - analysis.porosity_damaged,
-        "porosity_loss_first": first.porosity_initial - first.porosity_damaged,
-        "k_ratio": analysis.k_damaged / analysis.k_initial,
-        "k_ratio_first": first.k_damaged / first.k_initial,
-        "max_overlap": result.overlap.fraction,
-        "grain_shift": _shift(grains, result.damaged.grains()),
-    } | {f"bin_{number:02d}": float(count) for number, count in enumerate(bins)}
-
-
 def _depths(case: InvasionCase, result: Invasion) -> Array:
     depth = result.damaged.fines().position[:, 0]
     return depth[(depth >= 0) & (depth < case.size_m[0])]
@@ -199,11 +116,6 @@ def _depths(case: InvasionCase, result: Invasion) -> Array:
 
 def _mean(depth: Array) -> float:
     return float(np.mean(depth)) if len(depth) else 0.0
-
-
-def _shift(before: Snapshot, after: Snapshot) -> float:
-    moved = after.position[np.argsort(after.id)] - before.position[np.argsort(before.id)]
-    return float(np.sqrt(np.mean(np.sum(moved**2, axis=1))) / np.mean(before.radius))
 
 
 def relaxation_run(

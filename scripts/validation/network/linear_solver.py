@@ -1,165 +1,104 @@
-"""Method and tolerance of the network's solve, by size and spread of the conductances."""
+"""Methods to solve a network of pores, against 80 digits or against fdnet's own solve.
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+Nodes 0 to count - 1 of a circuit are pores, node `count` is the inlet plane (pressure 1) and node
+`count` + 1 is the outlet plane (pressure 0).
+"""
+
+import decimal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from decimal import Decimal
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import spsolve
 
-from fdnet.spheres.snapshot import Array
-from validation.engine.runner import forget_peak, peak_memory
-from validation.engine.study import DONE, Measured, Panel, Point, Row, Study, row_of
-from validation.engine.timing import least_time
-from validation.network.circuit import Circuit, circuit_of, exact_fluxes
-from validation.network.solver_peers import (
-    AGGREGATION,
-    DIRECT,
-    FDNET,
-    FDNET_DIRECT,
-    FDNET_MULTIGRID,
-    ITERATIVE,
-    JACOBI,
-    METHODS,
-    RUGE_STUBEN,
-    SPSOLVE,
-    UNIT_DIAGONAL,
-    Solved,
-    solve_by,
+from fdnet.errors import FlowError
+from fdnet.network.flow.flow import TOLERANCE
+from fdnet.network.flow.solver import (
+    balance_links,
+    conjugate_gradients,
+    direct,
+    groups,
+    laplacian,
+    ruge_stuben,
 )
+from fdnet.network.laws.named import LAWS
+from fdnet.network.network import build_network
+from fdnet.spheres.snapshot import Array, Snapshot, resting
+from validation.network.packs import least_time, truth_pack
+from validation.study import Point
 
+FDNET, DIRECT, SPSOLVE = "fdnet", "METIS + splu", "spsolve"
+RUGE_STUBEN, JACOBI = "CG + Ruge-Stuben", "CG + Jacobi"
+MOST_STEPS = {RUGE_STUBEN: 1_000, JACOBI: 20_000}
+METHODS = (FDNET, DIRECT, SPSOLVE, *MOST_STEPS)
 SMALL = 200
 """Pores up to which the answer is known in 80 digits."""
-IN_PROCESS = 5_000
-TOLERANCE, TOLERANCES = 1e-8, (1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14)
-DECADES = (0.0, 4.0, 8.0, 12.0, 16.0)
-OWN = "own"
-QUANTITIES = ("inflow", "worst throat", "residual", "mass balance")
-CORE, MEMORY, STEPS = "core seconds", "peak memory, MB", "steps"
-BREAK_EVEN = (1_000, 2_000, 3_000, 5_000, 10_000)
-SEEDS = 3
+TILE, SHAKE, LAW, PORES_PER_GRAIN, DIGITS = "packH_40_eps40", 0.02, "lubrication", 6.5, 80
 
 
-def points(quick: bool) -> list[Point]:
-    """Small networks with every method and tolerance, then sizes; fdnet's own method first.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Circuit:
+    """Links between pores and the two planes.
 
-    It is the reference of the others.
+    Attributes:
+        ends: (K, 2) nodes that a link joins.
+        conductance: (K,) of the links, in any one unit.
+        count: number of pores.
     """
-    chosen = list(
-        _small(
-            1 if quick else SEEDS,
-            (0.0, 8.0, 16.0) if quick else DECADES,
-            TOLERANCES[:: 2 if quick else 1],
-        )
-    )
-    if quick:
-        return [*chosen, *(_point(method, 1_000, 8.0) for method in (FDNET, DIRECT, RUGE_STUBEN))]
-    return [*chosen, *_sizes()]
+
+    ends: Array
+    conductance: Array
+    count: int
+
+    def out_of(self, flux: Array, plane: int) -> float:
+        """Flux (from first to second end) out of the inlet plane (0) or the outlet plane (1)."""
+        node = self.count + plane
+        return float(np.sum(flux[self.ends[:, 0] == node]) - np.sum(flux[self.ends[:, 1] == node]))
+
+    def imbalance(self, flux: Array) -> float:
+        """Sum over the pores of what flows in without flowing out."""
+        net = [
+            np.bincount(self.ends[:, side], weights=flux, minlength=self.count + 2)
+            for side in (0, 1)
+        ]
+        return float(np.abs(net[0] - net[1])[: self.count].sum())
+
+    def fluxes(self, pressure: Array) -> Array:
+        """Fluxes (K,) for pore pressures (count,)."""
+        p = np.concatenate([pressure, [1.0, 0.0]])
+        return np.asarray(self.conductance * (p[self.ends[:, 0]] - p[self.ends[:, 1]]))
 
 
-def _small(seeds: int, decades: Sequence[float], tolerances: Sequence[float]) -> Iterator[Point]:
-    for seed in range(seeds):
-        for spread in decades:
-            yield from (
-                _point(method, SMALL, spread, seed=seed) for method in (FDNET, DIRECT, SPSOLVE)
-            )
-            for method in (RUGE_STUBEN, AGGREGATION, JACOBI):
-                yield from (
-                    _point(method, SMALL, spread, tolerance, seed=seed) for tolerance in tolerances
-                )
-
-
-def _sizes() -> Iterator[Point]:
-    usual = (FDNET, DIRECT, RUGE_STUBEN, JACOBI)
-    for pores in BREAK_EVEN:
-        for spread in DECADES[::2]:
-            yield from (
-                _point(method, pores, spread) for method in (FDNET_DIRECT, FDNET_MULTIGRID)
-            )
-    for pores in (1_000, 3_000, 10_000):
-        for spread in DECADES:
-            yield from (_point(method, pores, spread) for method in (*usual, AGGREGATION, SPSOLVE))
-    for spread in DECADES[::2]:
-        yield from (_point(method, 30_000, spread) for method in usual)
-    for spread in DECADES:
-        yield from (_point(method, 100_000, spread) for method in usual)
-    yield from (_point(RUGE_STUBEN, 100_000, 8.0, to) for to in TOLERANCES if to != TOLERANCE)
-    yield from (_point(JACOBI, 100_000, 8.0, to) for to in TOLERANCES if to > TOLERANCE)
-    yield from (_point(AGGREGATION, 100_000, spread) for spread in (0.0, 8.0))
-    yield _point(SPSOLVE, 30_000, 0.0)
-    yield _point(UNIT_DIAGONAL, 100_000, 0.0)
-    yield from (_point(FDNET, 1_000_000, spread) for spread in DECADES[::2])
-    yield from (_point(RUGE_STUBEN, 1_000_000, spread) for spread in (0.0, 8.0))
-    yield _point(DIRECT, 1_000_000, 0.0)
-
-
-def _point(
-    method: str, pores: int, decades: float, tolerance: float = TOLERANCE, *, seed: int = 0
-) -> Point:
-    value = tolerance if method in ITERATIVE else OWN
-    return Point(
-        series=series_of(method, pores, decades),
-        knob="tolerance",
-        value=value,
-        seed=seed,
-        settings={"method": method, "pores": float(pores), "decades": decades},
-    )
-
-
-def series_of(method: str, pores: int, decades: float) -> str:
-    """Name of a curve."""
-    return f"{method}{suffix(pores, decades)}"
-
-
-def suffix(pores: int, decades: float) -> str:
-    """What the curves of one network and spread have in common."""
-    return f", {pores} pores, {decades:g} decades"
-
-
-def measure(point: Point, work: Path) -> dict[str, float]:
-    """Errors of one solve: against 80 digits up to 200 pores, beyond against fdnet's own."""
-    method, pores, decades = (
-        str(point.settings["method"]),
-        int(point.settings["pores"]),
-        point.settings["decades"],
-    )
-    circuit = circuit_of(pores, float(decades), point.seed, work)
-    tolerance = TOLERANCE if point.value == OWN else float(point.value)
-    solved, costs = _timed(method, circuit, tolerance)
-    flux = solved.flux
-    inflow = circuit.inflow(flux)
-    observed = {
-        "pores": float(circuit.count),
+def measure(point: Point, work: Path) -> Mapping[str, float]:
+    """Errors of one solve, over the inflow, with their uncertainty: the residual of the answer."""
+    method, pores = str(point.settings["method"]), int(point.settings["pores"])
+    decades, seed = float(point.settings["decades"]), int(point.seed)
+    circuit = circuit_of(pores, decades, seed, work)
+    tolerance = 1e-8 if point.value == "own" else float(point.value)
+    (flux, steps), seconds = least_time(lambda: solve_by(method, circuit, tolerance))
+    inflow = circuit.out_of(flux, 0)
+    found = {
         "inflow": inflow,
         "residual": circuit.imbalance(flux) / inflow,
-        "mass balance": abs(circuit.outflow(flux) / inflow - 1.0),
+        "mass balance": abs(-circuit.out_of(flux, 1) / inflow - 1.0),
+        "core_s": seconds,
+        "steps": steps,
     }
-    known = work / f"fluxes_{pores}_{decades:g}_{point.seed}.npy"
-    if pores <= SMALL:
-        observed |= _against(circuit, flux, _exact(pores, float(decades), point.seed, work))
-    elif method == FDNET:
+    known = work / f"fluxes_{pores}_{decades:g}_{seed}.npy"
+    if pores > SMALL and method == FDNET:
         np.save(known, flux)
-    elif known.exists():
-        observed |= _against(circuit, flux, np.load(known))
-    return observed | costs | {"steps": solved.steps}
-
-
-def _timed(method: str, circuit: Circuit, tolerance: float) -> tuple[Solved, dict[str, float]]:
-    """The solve with its core seconds, the least of three where it is quick, and peak memory."""
-    forget_peak()
-    solved, seconds = least_time(lambda: solve_by(method, circuit, tolerance))
-    memory = peak_memory() if circuit.count > IN_PROCESS else float("nan")
-    return solved, {"core_s": seconds, "peak_memory_bytes": memory}
-
-
-def _against(circuit: Circuit, flux: Array, exact: Array) -> dict[str, float]:
-    truth = circuit.inflow(exact)
-    worst = float(np.abs(flux - exact).max()) / truth
-    return {
-        "inflow, reference": truth,
-        "worst throat": worst,
-        "residual, reference": circuit.imbalance(exact) / truth,
-    }
+    elif pores <= SMALL or known.exists():
+        exact = _exact(pores, decades, seed, work) if pores <= SMALL else np.load(known)
+        truth = circuit.out_of(exact, 0)
+        found["inflow error"] = inflow / truth - 1.0
+        found["worst throat"] = float(np.abs(flux - exact).max()) / truth
+        left = circuit.imbalance(exact) / truth
+        found |= {"inflow error ±": left, "worst throat ±": left}
+    return found
 
 
 @cache
@@ -167,112 +106,187 @@ def _exact(pores: int, decades: float, seed: int, work: Path) -> Array:
     return exact_fluxes(circuit_of(pores, decades, seed, work))
 
 
-def judge(measured: Sequence[Measured]) -> list[Row]:
-    """Relative errors of the inflow, the worst throat, the residual and the mass balance.
+# ------------------------------------------------------------------------------------------------
+# Networks, and their exact answer.
 
-    The last three are over the inflow. Further rows hold the costs of solves to the usual
-    tolerance, by size.
+
+def circuit_of(pores: int, decades: float, seed: int, work: Path) -> Circuit:
+    """A circuit of about `pores` pores, periodic across the flow, by the law `lubrication`.
+
+    A pack of the Stokes truth is tiled and each grain moved by up to 2 % of its radius. Each
+    conductance is divided by a factor that is log-uniform over `decades`, drawn with `seed`.
+    Networks are kept in `work`.
     """
-    rows = [row for run in measured for row in _error_rows(run)]
-    done = [run for run in measured if run.status == DONE and run.point.seed == 0]
-    usual = [run for run in done if run.point.value in (OWN, TOLERANCE)]
-    return rows + [row for run in sorted(usual, key=_pores) for row in _cost_rows(run)]
+    stored = work / f"network_{pores}.npz"
+    if not stored.exists():
+        made = intact_circuit(pores)
+        part = stored.with_suffix(".part.npz")
+        np.savez(part, ends=made.ends, conductance=made.conductance, count=made.count)
+        part.replace(stored)
+    with np.load(stored) as file:
+        circuit = Circuit(
+            ends=file["ends"], conductance=file["conductance"], count=int(file["count"])
+        )
+    factor = 10.0 ** np.random.default_rng(seed).uniform(-decades, 0.0, len(circuit.ends))
+    return replace(circuit, conductance=circuit.conductance * factor)
 
 
-def _pores(run: Measured) -> float:
-    return run.observed.get("pores", float(run.point.settings["pores"]))
+def intact_circuit(pores: int) -> Circuit:
+    """The network of the tiled pack, conductances over their median.
+
+    Pores that no open path joins to a plane are left out.
+    """
+    pack = truth_pack(TILE)
+    tiles = pores / PORES_PER_GRAIN / len(pack)
+    across = max(round(tiles ** (1.0 / 3.0)), 1)
+    grains = _tiled(pack, np.array([max(round(tiles / across**2), 1), across, across]))
+    network = build_network(grains, periodic=(False, True, True), walls="slip")
+    x, (low, high) = network.pore_position[:, 0], network.box[0]
+    near, total = 1e-9 * (high - low), len(x)
+    node = np.where(
+        x <= low + near, total, np.where(x >= high - near, total + 1, network.pore_group)
+    )
+    conductance = LAWS[LAW](network) * network.throat_share
+    ends = node[network.throat_pores]
+    use = (conductance > 0) & (ends[:, 0] != ends[:, 1]) & (ends.min(axis=1) < total)
+    ends, conductance = ends[use], conductance[use]
+    group = groups(ends, total + 2)
+    tied = np.isin(group[:total], group[total:])
+    index = np.append(np.cumsum(tied) - 1, [tied.sum(), tied.sum() + 1])
+    live = np.isin(group[ends[:, 0]], group[total:])
+    return Circuit(
+        ends=index[ends[live]],
+        conductance=conductance[live] / np.median(conductance),
+        count=int(tied.sum()),
+    )
 
 
-def _error_rows(run: Measured) -> Iterator[Row]:
-    nan = float("nan")
-    if run.status != DONE:
-        yield row_of(run, QUANTITIES[0], error=nan, uncertainty=nan)
-        return
-    uncertainty = run.observed.get("residual, reference", nan)
-    truth = run.observed.get("inflow, reference", nan)
-    errors = dict(run.observed) | {"inflow": run.observed["inflow"] / truth - 1.0}
-    for name in QUANTITIES:
-        if name in errors:
-            yield row_of(
-                run,
-                name,
-                error=errors[name],
-                uncertainty=uncertainty if name in QUANTITIES[:2] else 0.0,
-            )
+def _tiled(pack: Snapshot, times: Array) -> Snapshot:
+    """`times` (3,) copies of a periodic pack, each grain moved by up to `SHAKE` of its radius."""
+    size = np.ptp(pack.box, axis=1)
+    steps = np.stack(np.meshgrid(*map(np.arange, times), indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    position = (pack.position + steps * size).reshape(-1, 3)
+    low, size = pack.box[:, 0], times * size
+    radius, kind = (np.tile(values, len(steps)) for values in (pack.radius, pack.kind))
+    moved = SHAKE * radius[:, None] * np.random.default_rng(0).uniform(-1, 1, position.shape)
+    box = np.stack([low, low + size], axis=1)
+    return resting(low + (position + moved - low) % size, radius, box, kind)
 
 
-def _cost_rows(run: Measured) -> Iterator[Row]:
-    method, decades = str(run.point.settings["method"]), run.point.settings["decades"]
-    costs = {CORE: run.core_s, MEMORY: run.peak_memory_bytes / 1e6, STEPS: run.steps}
-    for name, value in costs.items():
-        row = row_of(run, name, error=float("nan"), uncertainty=float("nan"))
-        yield replace(
-            row,
-            series=f"{method}, {decades:g} decades",
-            knob="pores",
-            value=_pores(run),
-            observed=value,
+def exact_fluxes(circuit: Circuit) -> Array:
+    """Fluxes (K,), computed in 80 digits.
+
+    Pores are taken out one by one, the one with the fewest neighbours first. The star of its links
+    is replaced by the mesh of conductances g_i g_j / sum(g) (Rosen 1924), which only adds and so
+    loses no digits. Then the pores are put back in reverse order, each at the mean of its
+    neighbours' pressures.
+    """
+    with decimal.localcontext(prec=DIGITS):
+        mesh: list[dict[int, Decimal]] = [{} for _ in range(circuit.count + 2)]
+        given = [Decimal(float(value)) for value in circuit.conductance]
+        ends = circuit.ends.tolist()
+        for (a, b), value in zip(ends, given, strict=True):
+            mesh[a][b] = mesh[b][a] = mesh[a].get(b, Decimal(0)) + value
+        pressure = [Decimal(0)] * (circuit.count + 2)
+        pressure[circuit.count] = Decimal(1)
+        for node, star in reversed(_eliminated(mesh, circuit.count)):
+            flow = sum((g * pressure[other] for other, g in star.items()), Decimal(0))
+            pressure[node] = flow / sum(star.values(), Decimal(0))
+        return np.array(
+            [float(g * (pressure[a] - pressure[b])) for (a, b), g in zip(ends, given, strict=True)]
         )
 
 
-def _error_panel(
-    pores: int, decades: float, quantity: str, title: str, methods: Sequence[str] = METHODS
-) -> Panel:
-    return Panel(
-        quantity=quantity,
-        title=title,
-        series=tuple(series_of(method, pores, decades) for method in methods),
-        label="over the inflow",
-        common=suffix(pores, decades),
+def _eliminated(
+    mesh: list[dict[int, Decimal]], count: int
+) -> list[tuple[int, dict[int, Decimal]]]:
+    """Each pore with its neighbours at the time it was taken out."""
+    left, order = set(range(count)), []
+    while left:
+        node = min(left, key=lambda one: len(mesh[one]))
+        left.remove(node)
+        star = list(mesh[node].items())
+        total = sum((g for _, g in star), Decimal(0))
+        for at, (a, g) in enumerate(star):
+            del mesh[a][node]
+            for b, h in star[at + 1 :]:
+                mesh[a][b] = mesh[b][a] = mesh[a].get(b, Decimal(0)) + g * h / total
+        order.append((node, mesh[node]))
+    return order
+
+
+# ------------------------------------------------------------------------------------------------
+# Methods.
+
+
+def solve_by(method: str, circuit: Circuit, tolerance: float) -> tuple[Array, float]:
+    """Fluxes (K,) by one of `METHODS`, and the steps of an iteration (nan of a direct method).
+
+    Iterative methods stop when the norm of the residual is `tolerance` times that of the source.
+
+    Raises FlowError when the steps run out, or when the system is singular.
+    """
+    if method == FDNET:
+        return _own(circuit), np.nan
+    matrix, source = _system(circuit)
+    steps = np.nan
+    if method == DIRECT:
+        pressure = direct(matrix)(source, 0.0)
+    elif method == SPSOLVE:
+        pressure = spsolve(matrix.tocsc(), source)
+    else:
+        pressure, steps = _iterated(method, matrix, source, tolerance)
+    if not np.all(np.isfinite(pressure)):
+        raise FlowError(f"{method}: pressures are not finite")
+    return circuit.fluxes(pressure), steps
+
+
+def _own(circuit: Circuit) -> Array:
+    """As `solve_flow` does it: both planes are node 0."""
+    node = np.where(circuit.ends >= circuit.count, 0, circuit.ends + 1)
+    inlet = 1.0 * (circuit.ends == circuit.count)
+    balance = balance_links(
+        node, circuit.conductance, inlet[:, 0] - inlet[:, 1], circuit.count + 1
+    )
+    if balance.defect > TOLERANCE:
+        raise FlowError(f"fdnet: residual {balance.defect:.2g}, expected <= {TOLERANCE:g}")
+    return balance.flux
+
+
+def _system(circuit: Circuit) -> tuple[sparse.csr_matrix, Array]:
+    """Matrix and source of the pores' mass balances, conductances over their median."""
+    unit = float(np.median(circuit.conductance))
+    tied, source = np.zeros(circuit.count), np.zeros(circuit.count)
+    for side in (0, 1):
+        own, other = circuit.ends[:, side], circuit.ends[:, 1 - side]
+        for plane, sums in ((circuit.count, (tied, source)), (circuit.count + 1, (tied,))):
+            next_to = (other == plane) & (own < circuit.count)
+            for total in sums:
+                np.add.at(total, own[next_to], circuit.conductance[next_to] / unit)
+    inner = np.all(circuit.ends < circuit.count, axis=1)
+    return laplacian(circuit.ends[inner], circuit.conductance[inner] / unit, tied), source
+
+
+def _iterated(
+    method: str, matrix: sparse.csr_matrix, source: Array, tolerance: float
+) -> tuple[Array, float]:
+    inverse, steps = 1.0 / matrix.diagonal(), 0
+    precondition: Callable[[Array], Array] = (
+        (lambda missing: inverse * missing) if method == JACOBI else ruge_stuben(matrix)
     )
 
+    def counted(missing: Array) -> Array:
+        nonlocal steps
+        steps += 1
+        return precondition(missing)
 
-def _cost_panel(quantity: str, decades: float, title: str) -> Panel:
-    common = f", {decades:g} decades"
-    names = tuple(f"{method}{common}" for method in METHODS if method != UNIT_DIAGONAL)
-    return Panel(
-        quantity=quantity,
-        title=title,
-        series=names,
-        label=quantity,
-        cost="value",
-        knob="pores",
-        common=common,
-    )
+    def norm(values: Array) -> float:
+        return float(np.linalg.norm(values))
 
-
-STUDY = Study(
-    name="linear-solver",
-    title="Solve of the pore network",
-    knob_label="tolerance",
-    points=points,
-    measure=measure,
-    judge=judge,
-    panels=(
-        _error_panel(
-            SMALL, 0.0, "worst throat", "worst throat flux, 200 pores, intact (against 80 digits)"
-        ),
-        _error_panel(
-            SMALL,
-            8.0,
-            "worst throat",
-            "worst throat flux, 200 pores, 8 decades (against 80 digits)",
-        ),
-        _error_panel(
-            SMALL,
-            16.0,
-            "worst throat",
-            "worst throat flux, 200 pores, 16 decades (against 80 digits)",
-        ),
-        _error_panel(100_000, 8.0, "residual", "sum of imbalances, 100,000 pores, 8 decades"),
-        _cost_panel(CORE, 0.0, "time by size, intact"),
-        _cost_panel(CORE, 8.0, "time by size, 8 decades"),
-    ),
-    defaults={
-        series_of(FDNET, pores, decades): OWN
-        for pores in (SMALL, 1_000, 3_000, 10_000, 30_000, 100_000, 1_000_000)
-        for decades in DECADES
-    },
-    isolated=lambda point: float(point.settings["pores"]) > IN_PROCESS,
-    seconds=300.0,
-)
+    most, within = MOST_STEPS[method], tolerance * norm(source)
+    pressure = conjugate_gradients(matrix, source, counted, within=within, size=norm, steps=most)
+    if np.any(np.isnan(pressure)):
+        raise FlowError(
+            f"{method}: residual not below {tolerance:g} of the source in {most} steps"
+        )
+    return pressure, float(steps)
