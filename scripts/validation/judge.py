@@ -272,9 +272,9 @@ def percent(level: Level) -> str:
     return f"{100 * level.error:+.3g}{band} %"
 
 
-def verdict(level: Level) -> str:
-    """What the seeds show: nothing where the band is larger than the error."""
-    if level.resolved or level.runs < 2 or level.error == 0.0:
+def verdict(level: Level, *, signed: bool = True) -> str:
+    """What the seeds show: nothing where the band is larger than a signed error."""
+    if not signed or level.resolved or level.runs < 2 or level.error == 0.0:
         return ""
     needed = level.seeds_needed
     would = f"{needed} would" if needed else f"more than {_MOST_SEEDS:,} would"
@@ -282,15 +282,24 @@ def verdict(level: Level) -> str:
 
 
 def table(
-    rows: pd.DataFrame, quantity: str, *, cost: str = "core_s", series: Sequence[str] = ("*",)
+    rows: pd.DataFrame,
+    quantity: str,
+    *,
+    cost: str = "core_s",
+    series: Sequence[str] = ("*",),
+    signed: bool = True,
 ) -> str:
-    """The errors of a quantity as Markdown, a line for each series and value."""
+    """The errors of a quantity as Markdown, a line for each series and value.
+
+    Nothing is said of a magnitude and its band, because it is never below zero.
+    """
     unit = {"core_s": "core s", "steps": "steps"}[cost]
     lines = [f"| series | value | error | {unit} | |", "|---|---|---|---|---|"]
     for name in dict.fromkeys(rows.series):
         if among(name, series):
             lines += [
-                f"| {name} | {one.value} | {percent(one)} | {one.cost:.3g} | {verdict(one)} |"
+                f"| {name} | {one.value} | {percent(one)} | {one.cost:.3g} "
+                f"| {verdict(one, signed=signed)} |"
                 for one in levels(rows, name, quantity, cost=cost)
             ]
     return "\n".join(lines)
@@ -315,6 +324,12 @@ class Shortcut(NamedTuple):
     error_of: str
     level: Level
     saves: float
+    signed: bool
+
+    @property
+    def resolved(self) -> bool:
+        """Whether the error stands out of its band; a magnitude does."""
+        return self.level.resolved or not self.signed
 
 
 def shortcut(
@@ -327,6 +342,7 @@ def shortcut(
     value: str,
     instead: str,
     instead_series: str | None = None,
+    signed: bool = True,
 ) -> Shortcut:
     """The shortcut of taking `value` of the knob, next to `instead`, of another series or not.
 
@@ -338,7 +354,7 @@ def shortcut(
     )
     if not one or not other:
         raise CaseError(f"{series}: has no {quantity} at {value} or {instead}")
-    return Shortcut(says, error_of, one[0], other[0].cost / one[0].cost)
+    return Shortcut(says, error_of, one[0], other[0].cost / one[0].cost, signed)
 
 
 def answer_table(shortcuts: Sequence[Shortcut]) -> str:
@@ -346,7 +362,7 @@ def answer_table(shortcuts: Sequence[Shortcut]) -> str:
     lines = ["| shortcut | time | error | of | |", "|---|---|---|---|---|"]
     lines += [
         f"| {one.says} | {1 / one.saves:.2g} × | {percent(one.level)} | {one.error_of} "
-        f"| {verdict(one.level)} |"
+        f"| {verdict(one.level, signed=one.signed)} |"
         for one in shortcuts
     ]
     return "\n".join(lines)

@@ -128,8 +128,8 @@ def draw_answer(shortcuts: Sequence[Shortcut], path: Path) -> None:
         axes = figure.subplots()
         for place, one in enumerate(reversed(shortcuts)):
             error, band = 100 * one.level.error, 100 * one.level.band
-            colour = CURVES[0] if one.level.resolved else CURVES[6]
-            face = colour if one.level.resolved else "white"
+            colour = CURVES[0] if one.resolved else CURVES[6]
+            face = colour if one.resolved else "white"
             axes.errorbar(
                 error, place, xerr=band, fmt="o", color=colour, mfc=face, capsize=2, markersize=4
             )

@@ -267,6 +267,7 @@ def study_table(study: Study, rows: pd.DataFrame) -> str:
             panel["quantity"],
             cost=panel.get("cost", "core_s"),
             series=panel.get("series", ("*",)),
+            signed=not panel.get("magnitude", False),
         )
         for panel in study.data["panel"]
     ]

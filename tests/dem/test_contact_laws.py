@@ -9,16 +9,15 @@ from builders import tiny
 from cut_and_continue import cell_case, differences
 
 from fdnet.case.case import with_fines
-from fdnet.case.file import case_from
+from fdnet.case.file import case_from, read_case
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.packing import make_pack
 from fdnet.scales.contacts import collision_time, overlap_of_impact, pair_elastic
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.geometry import max_overlap, touching_pairs
 from fdnet.spheres.snapshot import Kind, resting
-from validation.dem import size_ratio
 from validation.dem.closed import Watch, closed_run, kinetic_energy, restitution_of
-from validation.dem.runs import window_run
+from validation.dem.runs import SLAB, window_run
 
 pytestmark = pytest.mark.liggghts
 HERTZ = "contact.model=hertz"
@@ -131,7 +130,7 @@ def test_an_undamped_dense_pack_keeps_its_energy_at_the_largest_step(binary, tmp
 
 def held_of_sixty(friction: float, folder) -> float:
     """Dilute fines of 1/20 of a grain that the pack of the study `size-ratio` holds."""
-    data = size_ratio.case_of(size_ratio.points(quick=True)[0]).data()
+    data = read_case(SLAB.with_name("ratio.toml"), assignments=["run.time_step_factor=0.2"]).data()
     for name in ("grains", "fines"):
         del data[name]["normal_stiffness_N_m"]
     data["fines"]["friction"] = friction
