@@ -4,15 +4,13 @@ import csv
 
 import pytest
 
-from fdnet.cli import main
 from fdnet.names import DEFAULT_LAW
 from fdnet.network.laws.named import LAWS
 from validation.accuracy import ALL_PAIRS, ARCHIE, FINEST, PACKS
 from validation.command import run_study
 from validation.engine.table import read_rows
 from validation.network import laws
-from validation.truth import packs
-from validation.truth.cases import EQUAL, LATTICE
+from validation.truth import EQUAL, LATTICE
 
 FIFTH = "fines of 1/5"
 
@@ -65,15 +63,3 @@ def test_truth_brings_its_own_uncertainty(rows):
     assert {row.error_uncertainty for row in rows if row.series == FIFTH} == {0.013}
     own = laws.cases()[laws.INTACT].error
     assert {row.error_uncertainty for row in rows if row.series == EQUAL} == {own}
-
-
-def test_an_incomplete_installation_refuses_for_want_of_the_packs(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(packs, "DATA", tmp_path / "data")
-    laws.cases.cache_clear()
-    out = tmp_path / "out"
-    try:
-        assert main(["study", "laws", "--quick", "--out", str(out)]) == 2
-    finally:
-        laws.cases.cache_clear()
-    assert "data is not there; it holds the packs" in capsys.readouterr().err
-    assert not out.exists()

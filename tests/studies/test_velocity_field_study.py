@@ -6,7 +6,7 @@ import pytest
 from validation.command import run_study
 from validation.engine.table import read_rows
 from validation.network.velocity_field import FLUXES, STUDY, VELOCITY, pore_points
-from validation.truth.cases import simple_cubic
+from validation.truth import simple_cubic
 
 
 def test_errors_fall_with_the_cells(tmp_path):

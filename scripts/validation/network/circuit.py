@@ -15,7 +15,7 @@ from fdnet.network.flow.solver import groups
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.spheres.snapshot import Array
-from validation.truth.packs import read_pack, shaken, tiled, truth_folder
+from validation.truth import read_pack, tiled
 
 TILE, SHAKE, LAW = "packH_40_eps40", 0.02, "lubrication"
 PORES_PER_GRAIN = 6.5
@@ -90,11 +90,11 @@ def intact_circuit(pores: int) -> Circuit:
 
     Pores that no open path joins to a plane are left out.
     """
-    pack = read_pack(truth_folder() / f"{TILE}.csv")[0]
+    pack = read_pack(TILE)
     tiles = pores / PORES_PER_GRAIN / len(pack)
     across = max(round(tiles ** (1.0 / 3.0)), 1)
-    times = np.array([max(round(tiles / across**2), 1), across, across])
-    grains = shaken(tiled(pack, times), SHAKE, np.random.default_rng(0))
+    times = max(round(tiles / across**2), 1), across, across
+    grains = tiled(pack, times, SHAKE, np.random.default_rng(0))
     network = build_network(grains, periodic=(False, True, True), walls="slip")
     x, (low, high) = network.pore_position[:, 0], network.box[0]
     tolerance = 1e-9 * (high - low)

@@ -21,8 +21,8 @@ from validation.accuracy import (
 )
 from validation.engine.study import DONE, Measured, Panel, Point, Row, Study, row_of
 from validation.engine.timing import least_time
-from validation.truth.cases import EQUAL, LATTICE, LOOSE, UNEQUAL, Case, read_cases
-from validation.truth.packs import truth_folder, truth_tables
+from validation.truth import EQUAL, LATTICE, LOOSE, UNEQUAL, Case
+from validation.truth import cases as truth_cases
 
 INTACT, DAMAGED = "H_40_eps40", "H_r5_d13"
 """The packs solved on coarse grids too."""
@@ -40,7 +40,7 @@ QUANTITIES, SIZE = ("k", "k/k0"), "{}, size"
 @cache
 def cases() -> dict[str, Case]:
     """The packs of known permeability by name."""
-    return {case.name: case for case in read_cases(truth_tables(), [truth_folder()])[0]}
+    return {case.name: case for case in truth_cases()}
 
 
 def points(quick: bool) -> list[Point]:

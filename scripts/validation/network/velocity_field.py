@@ -14,7 +14,7 @@ from fdnet.spheres.snapshot import Array, Snapshot
 from validation.engine.study import Measured, Panel, Point, Row, Study, row_of
 from validation.engine.timing import least_time
 from validation.network.interception import happel, intercepted
-from validation.truth.packs import read_pack, truth_folder
+from validation.truth import read_pack
 
 PACKS = {
     "C, porosity 0.40": "packC_80_eps40",
@@ -46,7 +46,7 @@ def points(quick: bool) -> list[Point]:
 
 def measure(point: Point, work: Path) -> dict[str, float]:
     """Errors of velocity and fluxes, what tracers stick, and the seconds of the field."""
-    pack = read_pack(truth_folder() / f"{PACKS[point.series]}.csv")[0]
+    pack = read_pack(PACKS[point.series])
     cells, fine = float(point.value), float(point.settings["reference"])
     places, throats = pore_points(pack, POINTS, SEED), build_network(pack.grains(), periodic="xyz")
     expected, fluxes = _reference(point.series, fine, work)
@@ -102,7 +102,7 @@ def _reference(series: str, cells: float, work: Path) -> tuple[Array, Array]:
     """Velocity at the points of the pack, and fluxes of its throats, on the fine grid."""
     kept = work / f"{PACKS[series]}-{cells:g}.npz"
     if not kept.exists():
-        pack = read_pack(truth_folder() / f"{PACKS[series]}.csv")[0]
+        pack = read_pack(PACKS[series])
         field = velocity_field(pack, periodic="xyz", cells=cells, tolerance=0.02)
         network = build_network(pack.grains(), periodic="xyz")
         velocity = field.at(pore_points(pack, POINTS, SEED))
