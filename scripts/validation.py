@@ -13,7 +13,11 @@ from importlib import import_module
 
 from fdnet.errors import FdnetError
 
-CHAPTERS: dict[str, str] = {}
+CHAPTERS: dict[str, str] = {
+    "accuracy": "validation.accuracy",
+    "benchmark": "validation.benchmark",
+    "truth": "validation.truth_solved",
+}
 """Name and module of the comparisons with a command of their own, `main(arguments) -> int`.
 
 All other names are studies of error against run time.

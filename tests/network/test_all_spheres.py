@@ -25,7 +25,7 @@ from fdnet.network.states import Log, Sides, at_most_the_grains, measure_all_sph
 from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.one_section import from_python
 from tests.network.packs import random_pack, with_fines
-from validation.truth.packs import read_pack, truth_folder
+from validation.truth import read_pack
 
 SIDES = "yz"
 BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.3, 0.9]])
@@ -65,7 +65,7 @@ def test_k_is_that_of_the_network_of_all_spheres(pack, analysis):
 )
 def test_fines_lower_k_as_resolved_flow_does(name, ratio):
     """Random deposits come out 1 and 3 % high, and 4 % low (docs/accuracy.md)."""
-    spheres = read_pack(truth_folder() / f"{name}.csv")[0]
+    spheres = read_pack(name)
     result = analyse(spheres, periodic="xyz", walls="slip", damage_law="all-spheres")
     assert result.k_damaged / result.k_initial == pytest.approx(ratio, rel=0.06)
 

@@ -5,18 +5,10 @@ import pytest
 
 from fdnet.network.network import build_network
 from fdnet.spheres.geometry import measure_porosity
-from fdnet.spheres.readers import read_spheres
-from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
+from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic
+from validation.truth import read_pack
 
 ALL = (True,) * 3
-
-
-def truth_pack(root, name):
-    path = root / "scripts/validation/truth/data" / f"{name}.csv"
-    edge = float(path.read_text().split("edge ")[1].split()[0])
-    spheres = read_spheres(path, units="mm")
-    position, radius = spheres.position, spheres.radius
-    return snapshot(position * 1e3, radius * 1e3, [[0, edge]] * 3)
 
 
 @pytest.mark.parametrize(
@@ -36,16 +28,16 @@ def test_random_packs_have_no_slivers_unless_walls_cut_them():
 
 
 @pytest.mark.parametrize("name", ["packE_80_eps30", "packG_100_radii12_eps38"])
-def test_void_of_truth_packs_is_their_porosity(root, name):
-    pack = truth_pack(root, name)
+def test_void_of_truth_packs_is_their_porosity(name):
+    pack = read_pack(name)
     network = build_network(pack, periodic=ALL)
     porosity = measure_porosity(pack, periodic=ALL, lines=20_000)
     void = network.pore_volume.sum() / np.prod(pack.box[:, 1])
     assert void == pytest.approx(porosity.mean, abs=5 * porosity.standard_error + 1e-5)
 
 
-def test_overlapping_grains_are_counted_by_throat(root):
-    counts = build_network(truth_pack(root, "packE_80_eps30"), periodic=ALL).counts
+def test_overlapping_grains_are_counted_by_throat():
+    counts = build_network(read_pack("packE_80_eps30"), periodic=ALL).counts
     assert counts["throats_overlapping"] > 100
     touching = build_network(simple_cubic(), periodic=ALL).counts
     assert touching["throats_overlapping"] == 0

@@ -11,9 +11,7 @@ from fdnet.network.laws.wedges import ratio_table
 from fdnet.network.states import cut_out
 from tests.network.one_section import from_python, uneven_flux
 from tests.network.section_flux import resolved_flux
-from validation.engine.csv_rows import read_named
-from validation.truth.packs import MM
-from validation.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
+from validation.truth import read_pack, slabs
 
 ROOM = np.empty((2, 3, 3)), ray_room(0), ratio_table()
 BASE = np.array([[0.0, 0.0], [1.0, 0.0], [0.45, 0.85]])
@@ -70,11 +68,10 @@ def test_corners_know_the_grains_that_a_face_cuts():
 )
 def test_thin_slabs_of_grains_against_stokes(name):
     """Planes that cut caps off grains."""
-    row = next(one for one in read_named(SLAB_FOLDER / SLAB_TRUTH) if one["slab"] == name)
-    span = float(row["x_lo_mm"]) * MM, float(row["x_hi_mm"]) * MM
-    grains = read_specimen(SLAB_FOLDER / row["file"]).grains()
+    slab = next(slabs([name]))
+    grains = read_pack(slab.specimen).grains()
     sides = (False, True, True)
-    network = build_network(cut_out(grains, span, sides), periodic=sides)
+    network = build_network(cut_out(grains, slab.planes, sides), periodic=sides)
     k = whole_permeability(network, 1.0 / half_resistances(network).sum(axis=1))[0]
     tolerance = {"slabL_r10": 0.09, "slabM_r5_ranges_cake": 0.07, "slabQ_r5_mu0_light": 0.03}
-    assert k == pytest.approx(float(row["k0_mm2"]) * MM**2, rel=tolerance.get(name, 0.05))
+    assert k == pytest.approx(slab.k0, rel=tolerance.get(name, 0.05))

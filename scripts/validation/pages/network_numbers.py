@@ -21,7 +21,7 @@ from validation.pages.lookup import (
     rounded_up,
     significant,
 )
-from validation.truth.cases import LOOSE
+from validation.truth import LOOSE
 
 FEW_PORES = linear_solver.SMALL
 OWN_SERIES = re.compile(rf"{solver_peers.FDNET}, \d")
