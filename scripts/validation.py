@@ -17,6 +17,9 @@ CHAPTERS: dict[str, str] = {
     "accuracy": "validation.accuracy",
     "benchmark": "validation.benchmark",
     "truth": "validation.truth_solved",
+    "outside": "validation.outside",
+    "mechanics": "validation.mechanics",
+    "bridging": "validation.bridging",
 }
 """Name and module of the comparisons with a command of their own, `main(arguments) -> int`.
 

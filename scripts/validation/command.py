@@ -21,18 +21,12 @@ STUDIES: Mapping[str, str] = {
     "laws": "conductance and damage laws, and coarse resolved flow, against Stokes truth",
     "velocity-field": "cells across a grain for the velocity between the grains",
     "specimen-size": "number of grains and seed: how large a specimen must be",
-    "mechanics": "moduli by size and sides, triaxial tests by load steps and against LIGGGHTS",
-    "compaction": "porosity and permeability of sand under stress, bonded grains in the flow",
     "flow-updates": "how often a flow that follows its deposit is computed anew",
-    "outside-numbers": "the invasion on the real binary against closed forms and literature",
 }
 """Name of each study and its question; the module has the same name with underscores."""
 
 OF_NETWORK = ("linear-solver", "laws", "velocity-field", "specimen-size")
 """The studies of the network half; the others are of the invasion."""
-
-OUTSIDE = "outside-numbers"
-"""The study whose cases are a package of their own."""
 
 THESIS = "thesis"
 """A further study, of runs and figures rather than of error against run time."""
@@ -140,7 +134,7 @@ def study_named(name: str) -> Study:
 
 
 def _module(name: str) -> str:
-    room = "outside" if name == OUTSIDE else "network" if name in OF_NETWORK else "dem"
+    room = "network" if name in OF_NETWORK else "dem"
     return f"validation.{room}.{name.replace('-', '_')}"
 
 

@@ -85,7 +85,7 @@ def test_plates_carry_a_column_as_its_springs_in_series():
 
 def test_a_column_gives_way_under_the_flow_as_an_even_load_on_springs():
     """Five grains, six springs k, a force F on each: the middle one moves by 9 F / 2 k."""
-    from validation.dem.compaction import displacement_under_flow
+    from validation.mechanics import displacement_under_flow
 
     place = np.column_stack([(2 * np.arange(5) + 1) * R, np.full(5, R), np.full(5, R)])
     box = np.array([[0, 10 * R], [0, 2 * R], [0, 2 * R]])

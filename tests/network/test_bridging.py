@@ -4,13 +4,14 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from packs import simple_cubic
 
 from fdnet.network.network import build_network
 from fdnet.run.bridging import OpenThroats, classes_of, open_throats, width_rows, wilsons_band
 from fdnet.spheres.snapshot import Snapshot
-from validation.dem.bridging import pooled_classes
+from validation.bridging import pooled_classes
 
 
 def throats(ratio, clogged):
@@ -56,7 +57,7 @@ def test_throats_fall_into_their_classes_and_runs_add_up():
     assert [row["closed"] for row in first] == [0, 1, 1]
     second = rows_of([0.25, 0.25], [1, 1], 0.1)
     other = rows_of([0.25], [0], 0.2)
-    rows = pooled_classes([first, second, other])
+    rows = pooled_classes([pd.DataFrame(one) for one in (first, second, other)])
     assert [
         (row["concentration"], row["ratio_lo"], row["throats"], row["closed"]) for row in rows
     ] == [

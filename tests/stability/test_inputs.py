@@ -3,7 +3,6 @@
 import json
 import math
 from pathlib import Path
-from random import Random
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.network import build_network
 from fdnet.spheres.dump import parse_dump
 from tests.network.packs import random_pack, simple_cubic, snapshot
-from validation.fuzz import fuzz, targets
 
 HOSTILE = ["nan", "NaN", "inf", "-inf", "1e400", "-1e999", "", "1,5", "0x10", "1_0", "none"]
 
@@ -149,52 +147,3 @@ def test_no_fines_are_no_fault_of_occupancy():
     occupancy = measure_occupancy(build_network(pack, periodic=(True,) * 3), pack.fines())
     assert not occupancy.blocked.any()
     assert occupancy.pore_solid_volume.sum() == 0
-
-
-@pytest.mark.parametrize("seed", [11, pytest.param(12, marks=pytest.mark.nightly)])
-def test_some_hundred_mutated_inputs_make_no_fault(root, seed):
-    """The quick form of scripts/fuzz.py, whose long record is docs/validation/fuzz.json."""
-    record = fuzz.fuzz(root, main, seed=seed, indices=range(300), limit=20.0)
-    assert record["faults"] == []
-    assert len(record["kinds"]) == 9
-    assert all(sum(outcomes.values()) > 10 for outcomes in record["kinds"].values())
-
-
-def test_the_fuzz_knows_a_fault_when_it_meets_one(tmp_path):
-    """Deliberate breaks: a traceback, a hang, a warning, a file that stays, a wrong number."""
-
-    def outcome(judge, limit: float = 5.0) -> str:
-        return fuzz.outcome(targets.Target((b"",), {}, judge), b"", Random(1), limit)
-
-    def left(_: bytes, folder: Path, __: Random) -> str:
-        (folder / "decks").mkdir()
-        (folder / "decks" / "in.pack").write_text("half")
-        return targets.judge_case(b"name = ", folder, Random(1), command=main)
-
-    def endless(*_: object) -> str:
-        while True:
-            pass
-
-    assert "ZeroDivisionError" in outcome(lambda *_: str(1 / 0))
-    assert "RuntimeWarning" in outcome(lambda *_: str(np.float64(1.0) / np.float64(0.0)))
-    assert "not done within" in outcome(endless, 0.2)
-    assert "in.pack was written" in outcome(left)
-    good = (
-        '{"k_initial_m2": 1, "k_damaged_m2": 0.5, "porosity_initial": 0.4, '
-        '"porosity_damaged": 0.3, "sections": []}'
-    )
-    assert targets.judge_numbers(good) == "accepted"
-    for bad in (
-        good.replace("0.5", "1.5"),
-        good.replace("0.4", "1.1"),
-        good.replace("0.4", "NaN"),
-        good[:-1],
-    ):
-        assert targets.judge_numbers(bad).startswith("fault")
-
-
-def test_the_committed_record_is_of_ten_thousand_inputs_without_fault(root):
-    record = json.loads((root / "docs" / "validation" / "fuzz.json").read_text())
-    assert record["inputs"] >= 10_000
-    assert record["faults"] == []
-    assert sum(sum(outcomes.values()) for outcomes in record["kinds"].values()) == record["inputs"]

@@ -1,0 +1,265 @@
+"""Comparisons with numbers from elsewhere: one CSV of what was measured, one table, one figure.
+
+A chapter lists its comparisons. Its command measures the points that the CSV lacks, so it goes on
+where it was stopped; `--rows FILE.csv` judges rows that are there and runs nothing.
+"""
+
+import argparse
+import csv
+import math
+import os
+import shutil
+import sys
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from fdnet.case.case import Case
+from fdnet.dem.deck import snapshot_of
+from fdnet.dem.liggghts import Binary, Launch, find_binary
+from fdnet.dem.packing import make_pack
+from fdnet.errors import CaseError, FdnetError
+from fdnet.files import path_option, refuse_folder_name, replacing, write_text
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.dump import read_frame
+from fdnet.spheres.snapshot import Snapshot
+
+TEMPLATES = Path(__file__).parent / "templates"
+COLUMNS = ("comparison", "value", "seed", "quantity", "observed", "core_s", "status")
+DONE = "done"
+BLUE, ORANGE, BLACK = "#0072B2", "#D55E00", "#1A1A1A"
+Value = float | str
+Judge = Callable[[pd.DataFrame], list["Finding"]]
+
+
+class Trial(NamedTuple):
+    """One point that is measured: the knob's value, a seed, an empty folder, the reduced form."""
+
+    value: Any
+    seed: int
+    folder: Path
+    quick: bool
+
+
+class Finding(NamedTuple):
+    """A line of the table; `over` is the difference over the allowed one, nan without one."""
+
+    what: str
+    expected: str
+    source: str
+    measured: str
+    over: float
+    note: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """In words."""
+        return self.note or ("agrees" if abs(self.over) <= 1 else "**disagrees**")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """What is measured, and how it is judged.
+
+    Attributes:
+        name: as the CSV has it.
+        full: values of the knob, each with its number of seeds.
+        quick: those of the reduced form.
+        measure: observations by name of one trial.
+        judge: findings from the rows that were done.
+        of: names of the comparisons whose rows it takes.
+    """
+
+    name: str
+    full: Mapping[Value, int]
+    quick: Mapping[Value, int]
+    measure: Callable[[Trial], Mapping[str, float]]
+    judge: Judge
+    of: tuple[str, ...]
+
+
+class Chapter(NamedTuple):
+    """Comparisons, and what draws the second axes of their figure from the rows."""
+
+    comparisons: tuple[Comparison, ...]
+    panel: Callable[[Any, pd.DataFrame], None]
+
+
+def percent(error: float) -> str:
+    """A relative error with its sign, in percent; of one below 1e-5 no digit is shown."""
+    if abs(error) < 1e-5 or math.isinf(error):
+        return "within 0.001 %" if abs(error) < 1 else "never"
+    return f"{100 * error:+.2g} %".replace("-", "−")
+
+
+def comparisons_of(
+    table: Path,
+    measures: Mapping[str, Callable[[Trial], Mapping[str, float]]],
+    judges: Mapping[str, Judge],
+    exact: Mapping[str, Callable[[Any], float]],
+) -> tuple[Comparison, ...]:
+    """The comparisons of a TOML table; it names its functions as the mappings do."""
+    parts = tomllib.loads(table.read_text(encoding="utf-8"))["comparison"]
+    return tuple(
+        Comparison(
+            name=part["name"],
+            full=dict(part["full"]),
+            quick=dict(part["quick"]),
+            measure=measures[part["measure"]],
+            judge=judges[part["judge"]] if "judge" in part else _by_lines(part["line"], exact),
+            of=tuple(part.get("of", [part["name"]])),
+        )
+        for part in parts
+    )
+
+
+def _by_lines(
+    lines: Sequence[Mapping[str, Any]], exact: Mapping[str, Callable[[Any], float]]
+) -> Judge:
+    return lambda rows: [one for line in lines for one in _worst(rows, line, exact)]
+
+
+def _worst(
+    rows: pd.DataFrame, line: Mapping[str, Any], exact: Mapping[str, Callable[[Any], float]]
+) -> list[Finding]:
+    """The worst error of a line of the table; nothing without a row."""
+    rows = rows[rows.value.isin(line.get("values", rows.value))]
+    rows = rows[rows.quantity.str.contains(line.get("quantity", ""), regex=False)]
+    if rows.empty:
+        return []
+    law, within = line.get("exact", 0.0), line["within"]
+    truth = rows.value.map(exact[law] if isinstance(law, str) else lambda _: float(law))
+    error = (rows.observed - truth) / truth.abs().where(truth != 0, 1.0)
+    at = error.index[int(np.argmax(np.abs(error.to_numpy())))]
+    size = f"{rows.observed[at]:.4g}, " if truth[at] and np.isfinite(error[at]) else ""
+    worst = f", worst of {len(rows)}" if len(rows) > 1 else ""
+    expected = f"{line['expected']} ± {100 * within:g} %"
+    seen = f"{size}{percent(error[at])}{worst}"
+    return [Finding(line["what"], expected, line["source"], seen, error[at] / within)]
+
+
+def read_rows(path: Path) -> pd.DataFrame:
+    """The rows of the CSV; those of a value that is a number hold it as one."""
+    rows = pd.read_csv(path) if path.exists() else pd.DataFrame(columns=list(COLUMNS))
+    return rows.assign(value=[_value(text) for text in rows.value])
+
+
+def _value(text: Any) -> Value:
+    try:
+        return float(text)
+    except ValueError:
+        return str(text)
+
+
+def measure(comparisons: Sequence[Comparison], path: Path, *, quick: bool) -> None:
+    """Adds the points that the CSV lacks to it, one after the other."""
+    known = {(row.comparison, row.value, row.seed) for row in read_rows(path).itertuples()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    for one in comparisons:
+        for value, seeds in (one.quick if quick else one.full).items():
+            for seed in range(1, seeds + 1):
+                if (one.name, value, seed) in known:
+                    continue
+                folder = path.parent / "work" / f"{one.name} {value} {seed}".replace(" ", "-")
+                shutil.rmtree(folder, ignore_errors=True)
+                before, status, seen = _core_seconds(), DONE, {"": float("nan")}
+                try:
+                    seen = dict(one.measure(Trial(value, seed, folder, quick)))
+                except FdnetError as error:
+                    status = " ".join(str(error).split())
+                core = round(_core_seconds() - before, 3)
+                with path.open("a", newline="", encoding="utf-8") as file:
+                    writer = csv.writer(file)
+                    writer.writerows([COLUMNS] if file.tell() == 0 else [])
+                    writer.writerows(
+                        [one.name, value, seed, name, repr(observed), core, status]
+                        for name, observed in seen.items()
+                    )
+                print(f"{one.name} {value} {seed}: {seen} {status}", file=sys.stderr, flush=True)
+
+
+def _core_seconds() -> float:
+    return sum(os.times()[:4])
+
+
+def findings(comparisons: Sequence[Comparison], rows: pd.DataFrame) -> list[Finding]:
+    """The lines of all comparisons of which there are rows that were done."""
+    return [line for one in comparisons for line in one.judge(rows[rows.comparison.isin(one.of)])]
+
+
+def table(lines: Sequence[Finding]) -> str:
+    """The lines as a table in Markdown."""
+    rows = [(line.what, line.expected, line.source, line.measured, line.verdict) for line in lines]
+    head = [("what", "expected", "source", "measured", "verdict"), ("---",) * 5]
+    return "".join(f"| {' | '.join(row)} |\n" for row in [*head, *rows])
+
+
+def draw_differences(axes: Any, lines: Sequence[Finding]) -> None:
+    """Every difference with its sign over the one that is allowed; an arrow where it is larger."""
+    shown = [line for line in lines if not math.isnan(line.over)][::-1]
+    axes.axvspan(-1, 1, color="0.92")
+    axes.axvline(0, color=BLACK, lw=0.8)
+    for place, line in enumerate(shown):
+        colour = BLUE if abs(line.over) <= 1 else ORANGE
+        marker = "o" if abs(line.over) < 6 else ">" if line.over > 0 else "<"
+        axes.plot(min(6.0, max(-6.0, line.over)), place, marker, color=colour)
+    axes.set_yticks(range(len(shown)), [line.what for line in shown], fontsize=8)
+    axes.set(xlabel="difference over the allowed one (grey: agrees)")
+
+
+def command(name: str, chapter: Chapter, arguments: Sequence[str]) -> int:
+    """Measures, judges, and writes NAME.csv, NAME.md (the table) and NAME.png."""
+    from matplotlib.figure import Figure
+
+    comparisons = chapter.comparisons
+    names = [one.name for one in comparisons]
+    parser = argparse.ArgumentParser(prog=f"validation.py {name}")
+    parser.add_argument("--quick", action="store_true", help="the reduced form, about a minute")
+    parser.add_argument("--only", metavar="NAME", help=f"one of: {'; '.join(names)}")
+    parser.add_argument("--out", type=path_option, help="default studies/NAME")
+    parser.add_argument("--rows", type=path_option, help="judge this CSV and run nothing")
+    given = parser.parse_args(arguments)
+    refuse_folder_name(given.out or Path())
+    if given.only and given.only not in names:
+        raise CaseError(f"--only: {given.only!r} is not known, expected one of {names}")
+    out = given.out or Path("studies") / (f"{name}-quick" if given.quick else name)
+    if not given.rows:
+        find_binary()
+        chosen = [one for one in comparisons if given.only in (None, one.name)]
+        measure(chosen, out / f"{name}.csv", quick=given.quick)
+    elif not given.rows.is_file():
+        raise CaseError(f"--rows: there is no file {given.rows}")
+    rows = read_rows(given.rows or out / f"{name}.csv")
+    rows = rows[rows.status == DONE]
+    lines = findings(comparisons, rows)
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / f"{name}.md", table(lines))
+    figure = Figure(figsize=(13.0, 5.5), layout="constrained", dpi=110)
+    left, right = figure.subplots(1, 2)
+    draw_differences(left, lines)
+    chapter.panel(right, rows)
+    with replacing(out / f"{name}.png") as part:
+        figure.savefig(part)
+    print(table(lines))
+    return 0
+
+
+@cache
+def the_binary() -> Binary:
+    """LIGGGHTS, looked up once."""
+    return find_binary()
+
+
+def packed(case: Case, folder: Path) -> Snapshot:
+    """The case's grains, packed once for all trials that share seed, box and grains."""
+    plain = case.model_copy(update={"run": type(case.run)()})
+    own = folder / f"pack-{plain.digest('pack')}"
+    if not (own / "attempts.json").exists():
+        make_pack(plain, scales_of(plain), own, Launch(binary=the_binary()))
+    return snapshot_of(read_frame(own / "post" / "pack.dump"), plain, time_s=0.0)

@@ -1,0 +1,219 @@
+"""The attacks. Each is drawn from a generator, and returns "ok" or "refused" or raises FaultError.
+
+An attack that this machine does not allow calls `pytest.skip`.
+"""
+
+import os
+import resource
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from robustness.runs import (
+    NOTES,
+    TABLES,
+    Ended,
+    FaultError,
+    Prepared,
+    check_kept,
+    contents,
+    finish,
+    judge,
+    to_go_on,
+)
+
+Attack = Callable[[Random, Path, Prepared], str]
+KILLS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+FILES = (*TABLES, "summary.json", "manifest.json", "case.toml", ".unfinished")
+AT_STAKE = (*FILES, "pack/*", "pack/post/*", "invade/*", "invade/post/*")
+"""Files that are damaged: results, records, and what LIGGGHTS wrote."""
+UNREAD = (".lock", "screen.txt", "log.liggghts")
+FOREIGN = {
+    ".lock": "",
+    "summary.json": "{}",
+    "manifest.json": '{"name": "an extension", "version": 3}',
+    "report.html": "<p>mine</p>",
+    "case.toml": "mine = 1\n",
+    "pack/stage.json": "{}",
+    "pack/pack.data": "mine",
+    "figures/figure.png": "mine",
+}
+"""Names that fdnet uses too, in a folder of somebody else."""
+WIDE = "size=256m,nr_inodes=100000"
+
+
+def kill(rng: Random, place: Path, prepared: Prepared) -> str:
+    """A run is killed up to three times and continued."""
+    which = rng.choice(("", "packed", "unfinished", "unfinished"))
+    out = prepared.copy(which, place)
+    for _ in range(rng.randrange(1, 4)):
+        child = prepared.start(out, *to_go_on(out), fresh=rng.random() < 0.15)
+        child.let_run(rng.uniform(0.0, prepared.seconds[which]))
+        child.send(rng.choice(KILLS))
+        ended = child.wait()
+        if ended.code:
+            judge(prepared, out, ended, stopped=True)
+    return finish(prepared, out)
+
+
+def pause(rng: Random, place: Path, prepared: Prepared) -> str:
+    """A run is stopped for a moment and goes on."""
+    out = prepared.copy("unfinished", place)
+    child = prepared.start(out, "--resume")
+    for number in (signal.SIGSTOP, signal.SIGCONT) * rng.randrange(1, 4):
+        child.let_run(rng.uniform(0.0, 0.5 * prepared.seconds["unfinished"]))
+        child.send(number)
+    return judge(prepared, out, child.wait())
+
+
+def _target(rng: Random, out: Path) -> Path:
+    """A file of the run that is not empty; each pattern of AT_STAKE has the same chance."""
+    groups = [
+        [
+            path
+            for path in sorted(out.glob(pattern))
+            if path.is_file() and path.stat().st_size and path.name not in UNREAD
+        ]
+        for pattern in AT_STAKE
+    ]
+    return rng.choice(rng.choice([group for group in groups if group]))
+
+
+def damage(how: str, rng: Random, place: Path, prepared: Prepared) -> str:
+    """A file is damaged; then the run is repeated, analysed anew, or continued."""
+    which = rng.choice(("finished", "unfinished"))
+    out = prepared.copy(which, place)
+    path, other = _target(rng, out), _target(rng, out)
+    data = bytearray(path.read_bytes())
+    if how == "cut":
+        path.write_bytes(data[: rng.randrange(len(data))])
+    elif how == "zero":
+        path.write_bytes(bytes(len(data)))
+    elif how == "garble":
+        start = rng.randrange(len(data))
+        for at in range(start, min(len(data), start + rng.choice((1, 8, 400)))):
+            data[at] = rng.randrange(256)
+        path.write_bytes(data)
+    elif how == "swap":
+        path.write_bytes(other.read_bytes())
+        other.write_bytes(data)
+    else:
+        path.unlink()
+    options = rng.choice(([], ["--force", "--stages", "analyse"]))
+    options = ["--resume"] if which == "unfinished" else options
+    before = contents(out)
+    try:
+        result = judge(prepared, out, prepared.call(out, *options))
+        check_kept(out, before, everything=result == "refused" and not options)
+        if result == "refused" and rng.random() < 0.2:
+            anew = judge(prepared, out, prepared.call(out, "--force"))
+            assert anew == "ok", "--force is refused too"
+    except FaultError as fault:
+        names = f"{path.relative_to(out)}, {other.relative_to(out)}"
+        raise FaultError(f"{fault} ({which} {' '.join(options)}: {how} {names})") from fault
+    return result
+
+
+def limit(what: int, values: tuple[int, ...], rng: Random, place: Path, prepared: Prepared) -> str:
+    """A run lacks something the system limits; then the limit is lifted and it is continued."""
+    out, most = prepared.copy("unfinished", place), rng.choice(values)
+    fresh = what != resource.RLIMIT_FSIZE
+    try:
+        ended = prepared.call(out, "--resume", fresh=fresh, limits={what: most})
+        return judge(prepared, out, ended) if ended.code == 0 else resumed(prepared, out, ended)
+    except FaultError as fault:
+        raise FaultError(f"{fault} (limit {most})") from fault
+
+
+def resumed(prepared: Prepared, out: Path, ended: Ended) -> str:
+    """Judges a command that was refused, and continues the run."""
+    judge(prepared, out, ended)
+    return finish(prepared, out)
+
+
+def race(rng: Random, place: Path, prepared: Prepared) -> str:
+    """Two commands on one folder at the same time: one runs, the other is refused or waits."""
+    which = rng.choice(("", "packed", "unfinished", "unfinished"))
+    out = prepared.copy(which, place)
+    first = prepared.start(out, "--resume")
+    first.let_run(rng.choice((0.0, rng.uniform(0.0, prepared.seconds[which]))))
+    second = prepared.start(out, "--resume")
+    results = [judge(prepared, out, ended) for ended in (first.wait(), second.wait())]
+    if "ok" not in results:
+        raise FaultError("race: both commands were refused")
+    return "ok"
+
+
+def foreign(rng: Random, place: Path, prepared: Prepared) -> str:
+    """A folder of somebody else is refused, also with --resume and --force."""
+    out = place / "run"
+    names = {NOTES, *rng.sample(sorted(FOREIGN), rng.randrange(4))}
+    for name in sorted(names):
+        (out / name).parent.mkdir(parents=True, exist_ok=True)
+        (out / name).write_text(FOREIGN.get(name, "mine"))
+    before, options = contents(out), rng.choice(([], ["--resume"], ["--force"]))
+    ended = prepared.call(out, *options)
+    check_kept(out, before, everything=True)
+    if ended.code == 0:
+        raise FaultError(f"lost: a run in a folder of somebody else, with {options} {names}")
+    return judge(prepared, out, ended)
+
+
+@contextmanager
+def small_disk(place: Path) -> Iterator[Callable[[str], str]]:
+    """A disk at `place`, and a function that sets its limits and returns what forbids it."""
+    place.mkdir()
+
+    def mount(options: str) -> str:
+        words = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(place)]
+        return subprocess.run(words, capture_output=True, text=True, check=False).stderr.strip()
+
+    if refusal := mount(WIDE):
+        pytest.skip(f"no disk can be mounted here: {refusal}")
+    try:
+        yield lambda options: mount(f"remount,{options}")
+    finally:
+        while subprocess.run(["umount", "-l", place], capture_output=True, check=False).returncode:
+            time.sleep(0.1)
+
+
+def full_disk(rng: Random, place: Path, prepared: Prepared) -> str:
+    """Bytes or inodes of the disk run out; then there is room and the run is continued."""
+    with small_disk(place / "disk") as resize:
+        out = prepared.copy(rng.choice(("packed", "unfinished")), place / "disk")
+        used = os.statvfs(place / "disk")
+        size = (used.f_blocks - used.f_bfree) * used.f_frsize
+        name, most = rng.choice(
+            (
+                ("nr_inodes", used.f_files - used.f_ffree + rng.choice((0, 1, 2, 4, 8, 16, 32))),
+                ("size", size + (rng.choice((0, 4, 16, 32, 64, 128, 192, 256, 384)) << 10)),
+            )
+        )
+        if refusal := resize(f"{name}={max(1, most)}"):
+            pytest.skip(f"the disk cannot be made smaller: {refusal}")
+        ended = prepared.call(out, *["--resume"] * (out / ".unfinished").exists())
+        result = judge(prepared, out, ended)
+        resize(WIDE)
+        return result if result == "ok" else finish(prepared, out)
+
+
+ATTACKS: Mapping[str, Attack] = {
+    "kill": kill,
+    "foreign": foreign,
+    "garble": partial(damage, "garble"),
+    "file size": partial(limit, resource.RLIMIT_FSIZE, (0, 1000, 8_000, 30_000, 100_000)),
+    "race": race,
+    "pause": pause,
+    **{how: partial(damage, how) for how in ("cut", "zero", "remove", "swap")},
+    # with 4 handles Python does not start; below 200 MB the import of numpy ends the process
+    "handles": partial(limit, resource.RLIMIT_NOFILE, (5, 6, 8, 12, 16, 24, 48)),
+    "memory": partial(limit, resource.RLIMIT_AS, (300 << 20, 600 << 20, 1 << 30)),
+    "full disk": full_disk,
+}
