@@ -1,5 +1,7 @@
 """Small cases, built in code."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -60,3 +62,13 @@ def followed(*more, way="fluid.velocity_m_s=5.0"):
         "run.checkpoint_ms=0.1",
         *more,
     )
+
+
+@contextmanager
+def told(*case: object) -> Iterator[None]:
+    """Names the `case` of a loop where it fails."""
+    try:
+        yield
+    except BaseException as error:
+        error.add_note(f"case: {', '.join(map(repr, case))}")
+        raise

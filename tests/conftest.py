@@ -1,13 +1,18 @@
 """Shared fixtures."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from fdnet.dem.liggghts import Binary, find_binary
+from fdnet.case.case import Case
+from fdnet.dem.liggghts import Binary, Launch, find_binary
+from fdnet.dem.packing import make_pack
 from fdnet.run.finished import FinishedRun
+from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Snapshot
 
 sys.path.insert(0, str(Path(__file__).parent))
 ROOT = Path(__file__).resolve().parents[1]
@@ -37,6 +42,23 @@ def root() -> Path:
 def binary() -> Binary:
     """The real LIGGGHTS; the suite needs it (scripts/setup.sh installs it)."""
     return find_binary()
+
+
+@pytest.fixture(scope="session")
+def grains_of(
+    binary: Binary, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[Case], Snapshot]:
+    """Grains of a case, packed once for all tests that ask for the same pack."""
+    made: dict[str, Snapshot] = {}
+
+    def grains(case: Case) -> Snapshot:
+        name = case.digest("pack")
+        if name not in made:
+            folder = tmp_path_factory.mktemp(f"pack-{name}")
+            made[name] = make_pack(case, scales_of(case), folder, Launch(binary=binary)).grains
+        return made[name]
+
+    return grains
 
 
 @pytest.fixture(scope="session")

@@ -1,12 +1,14 @@
 """`fdnet check`: what is odd about a case is said with what follows and what to do."""
 
+import csv
 import json
+import math
 import re
 import subprocess
 import sys
 
 import pytest
-from builders import tiny
+from builders import tiny, told
 
 import fdnet
 from fdnet.campaign.result.words import value_text
@@ -27,35 +29,42 @@ def keys(*assignments: str) -> set[str]:
 
 
 WELL = ("well.radius_mm=108", "well.drainage_radius_m=100")
+
+
 BULKY = ("box.size_mm=[3.0,3.0,3.0]", "grains.count=248", "box.sides=periodic")
+
+
 SOUND = (*WELL, *BULKY, "fines.count=3000")
 
 
-@pytest.mark.parametrize(
-    ("odd", "key"),
-    [
+def test_what_is_odd_is_named_and_nothing_else():
+    for odd, key in [
         (("box.size_mm=[3.0,1.6,1.6]", "grains.count=66"), "box.size_mm"),
         (("analysis.sections=7",), "analysis.sections"),
         (("fines.count=100",), "fines.count"),
         (("run.cap_ms=2.0",), "run.cap_ms"),
         (("fines.radius_mm=0.12", "fines.count=400"), "fines.radius_mm"),
-    ],
-)
-def test_what_is_odd_is_named_and_nothing_else(odd, key):
-    assert key not in keys(*SOUND)
-    assert key in keys(*SOUND, *odd)
+    ]:
+        with told(odd, key):
+            assert key not in keys(*SOUND)
+            assert key in keys(*SOUND, *odd)
 
 
-def test_a_velocity_that_no_well_has_is_named():
+def test_a_velocity_of_no_well_and_a_finest_tenth_that_takes_the_time_are_named():
     fast, usual = "fluid.velocity_m_s=5.0", "fluid.velocity_m_s=0.05"
     assert "well" in keys(*BULKY, fast)
     assert "well" not in keys(*BULKY, usual)
+    tables = tiny(*SOUND).data()
+    for key in ("radius_mm", "count"):
+        del tables["fines"][key]
+    sizes = {"D10_mm": 0.01, "D50_mm": 0.04, "D90_mm": 0.1}
+    tables["fines"] |= {"sizes": sizes, "slab_mm": 3.0}
+    case = case_from(tables)
+    assert "fines.cut_um" in {one.key for one in checked(case, scales_of(case)).findings}
 
 
 def test_the_errors_by_width_are_those_of_the_study(root):
     """The means of `specimen-size.csv` over the seeds of each cube."""
-    import csv
-    import math
 
     path = root / "docs/evidence/error_against_time/specimen-size.csv"
     rows = [
@@ -78,9 +87,6 @@ def test_the_errors_by_width_are_those_of_the_study(root):
             assert sum(got) / len(got) / (sum(bulk) / len(bulk)) - 1 == pytest.approx(
                 error, abs=0.002
             )
-
-
-def test_a_wider_specimen_is_nearer_to_the_bulk():
     assert width_error(4.8, periodic=False) == pytest.approx(-0.226, abs=0.041)
     assert width_error(5.5, periodic=True) == pytest.approx(-0.0595, abs=0.002)
     assert -0.01 < width_error(100, periodic=True) < 0
@@ -105,29 +111,31 @@ def test_the_command_prints_findings_with_what_to_do(tmp_path, capsys):
     assert text.strip() in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("assignments", "refused"),
-    [
-        ((), ""),
-        (("grains.count=3", "run.stiffness_N_m=auto"), "3 grains, expected at least 4"),
-        (("clean_up={drawdown_MPa=1000.0}",), "clean_up.drawdown_MPa: 1000"),
-        (("fines.count=4000", "fines.concentration=0.3"), "fines without a place"),
-        (("grains={radius_mm=0.25, porosity=0.2, max_overlap=0.02}",), "0.2 is out of reach"),
-        (("run.max_hours=1e-6",), "run.max_hours"),
-        (("fluid.velocity_m_s=5e9",), "drag alone would press"),
-    ],
-)
-def test_check_refuses_what_run_refuses(assignments, refused, tmp_path, capsys):
+def test_check_refuses_what_run_refuses(tmp_path, capsys):
     """Both have one list, so they say the same, too."""
-    path, out = tmp_path / "case.toml", tmp_path / "run"
-    path.write_text(tiny(*assignments).toml())
-    assert main(["check", str(path)]) == (2 if refused else 0)
-    said = " ".join("".join(capsys.readouterr()).split())
-    assert refused in said
-    if refused:
-        assert main(["run", str(path), "--out", str(out)]) == 2
-        assert refused in capsys.readouterr().err
-        assert not out.exists()
+    for number, (assignments, refused) in enumerate(
+        [
+            ((), ""),
+            (("grains.count=3", "run.stiffness_N_m=auto"), "3 grains, expected at least 4"),
+            (("clean_up={drawdown_MPa=1000.0}",), "clean_up.drawdown_MPa: 1000"),
+            (("fines={radius_mm=0.2, count=200, concentration=0.3}",), "fines without a place"),
+            (("grains={radius_mm=0.25, porosity=0.2, max_overlap=0.02}",), "0.2 is out of reach"),
+            (("run.max_hours=1e-6",), "run.max_hours"),
+            (("fluid.velocity_m_s=5e9",), "drag alone would press"),
+        ]
+    ):
+        folder_ = tmp_path / str(number)
+        folder_.mkdir()
+        with told(assignments, refused):
+            path, out = folder_ / "case.toml", folder_ / "run"
+            path.write_text(tiny(*assignments).toml())
+            assert main(["check", str(path)]) == (2 if refused else 0)
+            said = " ".join("".join(capsys.readouterr()).split())
+            assert refused in said
+            if refused:
+                assert main(["run", str(path), "--out", str(out)]) == 2
+                assert refused in capsys.readouterr().err
+                assert not out.exists()
 
 
 def test_what_check_finds_stands_in_summary_and_report(finished):
@@ -158,40 +166,32 @@ sys.exit(fdnet.cli.main())
 """
 
 
-@pytest.mark.parametrize("raises", [True, False])
-def test_a_stop_inside_a_compiler_is_one_line(raises):
+def test_a_stop_inside_a_compiler_is_one_line():
     """llvmlite's call-back loses a KeyboardInterrupt, and numba raises another error for it."""
-    command = [sys.executable, "-c", STOPPED.format(raises=raises)]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=15, check=False)
-    assert ended.returncode == 130
-    (line,) = ended.stderr.splitlines()
-    assert "repeat the command to go on (a run: with --resume)" in line
+    for raises in [True, False]:
+        with told(raises):
+            command = [sys.executable, "-c", STOPPED.format(raises=raises)]
+            ended = subprocess.run(
+                command, capture_output=True, text=True, timeout=15, check=False
+            )
+            assert ended.returncode == 130
+            (line,) = ended.stderr.splitlines()
+            assert "repeat the command to go on (a run: with --resume)" in line
 
 
-def test_a_range_whose_finest_tenth_takes_the_time_is_named():
-    tables = tiny(*SOUND).data()
-    for key in ("radius_mm", "count"):
-        del tables["fines"][key]
-    tables["fines"] |= {
-        "sizes": {"D10_mm": 0.01, "D50_mm": 0.04, "D90_mm": 0.1},
-        "slab_mm": 3.0,
-    }
-    case = case_from(tables)
-    named = checked(case, scales_of(case)).findings
-    assert "fines.cut_um" in {one.key for one in named}
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [(0.2, "1 s"), (62, "62 s"), (110, "2 min"), (7200, "2 h"), (12000, "3 h 20 min"),
-     (5e5, "139 h"), (1e9, "2.8e+05 h (32 years)")],
-)  # fmt: skip
-def test_times_are_said_in_hours_and_minutes(seconds, words):
-    assert spoken_time(seconds) == words
-
-
-def test_memory_is_said_in_megabytes():
+def test_times_are_said_in_hours_and_minutes():
     assert (spoken_memory(6.6e8), spoken_memory(2.34e9)) == ("660 MB", "2.3 GB")
+    for seconds, words in [
+        (0.2, "1 s"),
+        (62, "62 s"),
+        (110, "2 min"),
+        (7200, "2 h"),
+        (12000, "3 h 20 min"),
+        (5e5, "139 h"),
+        (1e9, "2.8e+05 h (32 years)"),
+    ]:
+        with told(seconds, words):
+            assert spoken_time(seconds) == words
 
 
 def test_laws_of_the_thesis_are_said_to_be_wrong_with_the_default_beside(finished, capsys):

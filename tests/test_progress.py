@@ -1,6 +1,7 @@
 """Progress shows the step, the invaded count and an honest time left; it never runs over."""
 
 import pytest
+from builders import told
 
 from fdnet.run.progress import Forecast, Progress
 
@@ -9,6 +10,8 @@ WELL = (
     [97, 305, 506, 687, 847, 995, 1097, 1165, 1194, 1199, 1200, 1201, 1203],
     6049,
 )
+
+
 SPECIMEN5 = (
     Forecast(expected=16931, plug=4943, cap=68665),
     [159, 348, 447, 481, 492, 494, 496, 496, 496, 496, 496],
@@ -50,22 +53,23 @@ def test_lines_of_a_run_become_progress(capsys, clock):
     assert "~42 s left" in shown
 
 
-@pytest.mark.parametrize(
-    ("lines", "text"),
-    [
+def test_a_line_of_progress_has_no_gap_and_no_long_number(capsys, clock):
+    with Progress("pack", Forecast(expected=10), show=False) as progress:
+        progress("FDNET grown 1 30")
+    assert capsys.readouterr().err == "", "quiet says nothing"
+    for lines, text in [
         (["   3581   1369   1.5e-07   0.21"], "pack: step 3581 of ~586812\n"),
         (["FDNET relaxing 5 2.1234567890123e-15"], "coming to rest, 5 times, energy 2.12e-15 J\n"),
         (["FDNET grown 3 30"], "pack: step 0 of ~586812, grown 3 of 30\n"),
         (["FDNET restoring"], ""),
-    ],
-)
-def test_a_line_of_progress_has_no_gap_and_no_long_number(lines, text, capsys, clock):
-    with Progress("pack", 586812) as progress:
-        for line in lines:
-            clock.now += 6
-            progress(line)
-    assert capsys.readouterr().err.endswith(text)
-    assert text or progress.note == ""
+    ]:
+        with told(lines, text):
+            with Progress("pack", 586812) as progress:
+                for line in lines:
+                    clock.now += 6
+                    progress(line)
+            assert capsys.readouterr().err.endswith(text)
+            assert text or progress.note == ""
 
 
 def test_a_count_of_steps_beyond_use_has_three_digits(capsys, clock):
@@ -75,25 +79,20 @@ def test_a_count_of_steps_beyond_use_has_three_digits(capsys, clock):
     assert "step 3581 of ~1.23e+14" in capsys.readouterr().err
 
 
-def test_quiet_says_nothing(capsys):
-    with Progress("pack", Forecast(expected=10), show=False) as progress:
-        progress("FDNET grown 1 30")
-    assert capsys.readouterr().err == ""
-
-
-@pytest.mark.parametrize(("forecast", "crossed", "chunk"), [WELL, SPECIMEN5])
-def test_the_time_left_of_recorded_runs_is_within_a_factor_of_two(forecast, crossed, chunk, clock):
+def test_the_time_left_of_recorded_runs_is_within_a_factor_of_two(clock):
     """Later steps are slower, as more fines are there: the last third decides."""
-    times = [60.0]
-    for number in range(1, len(crossed)):
-        times.append(times[-1] + 60.0 + 2.0 * number)
-    progress = Progress("invade", forecast, show=False)
-    for number, (count, now) in enumerate(zip(crossed, times, strict=True), start=1):
-        clock.now = now
-        progress(f"FDNET checkpoint {number} {number * chunk} 0 {count} 0")
-        left = times[-1] - now
-        if number > 1 and left > 0.1 * times[-1]:
-            assert 0.5 < progress._left() / left < 2
+    for forecast, crossed, chunk in [WELL, SPECIMEN5]:
+        with told(forecast, crossed, chunk):
+            times = [60.0]
+            for number in range(1, len(crossed)):
+                times.append(times[-1] + 60.0 + 2.0 * number)
+            progress = Progress("invade", forecast, show=False)
+            for number, (count, now) in enumerate(zip(crossed, times, strict=True), start=1):
+                clock.now = now
+                progress(f"FDNET checkpoint {number} {number * chunk} 0 {count} 0")
+                left = times[-1] - now
+                if number > 1 and left > 0.1 * times[-1]:
+                    assert 0.5 < progress.left() / left < 2
 
 
 def test_progress_never_runs_over_its_end():
@@ -111,4 +110,4 @@ def test_a_pack_that_is_made_again_counts_from_zero(clock):
     for step in (500, 900, 100, 200):
         clock.now += 10.0
         progress(f"   {step}   70   1.5e-07   0.21")
-    assert progress._left() == pytest.approx(80.0)
+    assert progress.left() == pytest.approx(80.0)

@@ -13,6 +13,8 @@ from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -80,7 +82,9 @@ class Cleaned(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What a checkpoint was when its files were whole, in SHA-256 but for `ranks` and `row`.
+    """What a checkpoint was when its files were whole.
+
+    In SHA-256 but for `ranks`, `row` and `fdnet`.
 
     Attributes:
         case: what the stage depends on.
@@ -90,6 +94,7 @@ class Record(NamedTuple):
         dump: the dump.
         restart: the restart.
         updates: the updates of a coupled stage before the checkpoint.
+        fdnet: version of fdnet, whose forces these are; "" by a version that did not record it.
     """
 
     case: str
@@ -99,6 +104,7 @@ class Record(NamedTuple):
     dump: str
     restart: str
     updates: str
+    fdnet: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,6 +156,7 @@ class Checkpoints:
             ranks=ranks,
             row=csv_row(row),
             overlap=_digest(overlaps),
+            fdnet=fdnet_version(),
             **self._digests(row.step),
         )
         self.store(row.step, record)
@@ -218,15 +225,28 @@ class Checkpoints:
         if last is not None:
             cut_watch(self.folder, last.step)
 
-    def refuse_other_ranks(self, ranks: int) -> None:
-        """Raises CaseError when the cut stage ran on another number of MPI ranks."""
+    def refuse_another_way(self, ranks: int) -> None:
+        """Raises CaseError when the cut stage was begun in a way that would give another result.
+
+        That is on another number of MPI ranks, or by another version of fdnet.
+        """
+        stage = "invasion" if self.stage == "invade" else "clean-up"
         for step, _ in self.files("record"):
             record = self.record(step)
-            if record and record.case == self.digest and record.ranks != ranks:
+            if record is None or record.case != self.digest:
+                continue
+            if record.ranks != ranks:
                 raise CaseError(
-                    f"{self.folder}: this {'invasion' if self.stage == 'invade' else 'clean-up'} "
+                    f"{self.folder}: this {stage} "
                     f"was begun with --np {record.ranks}, and --np {ranks} would give neither "
                     f"result; continue with --np {record.ranks}, or start over with --force"
+                )
+            if record.fdnet != fdnet_version():
+                begun = record.fdnet or "of an earlier version"
+                raise CaseError(
+                    f"{self.folder}: this {stage} was begun with fdnet {begun}, and fdnet "
+                    f"{fdnet_version()} may make other forces; run it anew with --force, or "
+                    "continue with the fdnet that began it"
                 )
 
     def doubt(self, last: Any | None) -> None:
@@ -259,6 +279,12 @@ class Checkpoints:
     def doubts(self) -> list[str]:
         """The warnings that this and earlier sessions kept."""
         return _whole_lines(self.folder / DOUBTS)
+
+
+@cache
+def fdnet_version() -> str:
+    """The version of fdnet that runs."""
+    return version("fdnet")
 
 
 def file_digest(path: Path) -> str:

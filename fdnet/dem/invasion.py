@@ -131,7 +131,7 @@ class ChunkedStage(ABC):
                 "fdnet.run_case"
             )
         (self.folder / "post").mkdir(parents=True, exist_ok=True)
-        self.points.refuse_other_ranks(self.launch.ranks)
+        self.points.refuse_another_way(self.launch.ranks)
         while True:
             last = self.points.last()
             self.points.doubt(last)

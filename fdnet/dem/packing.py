@@ -334,7 +334,7 @@ def _attempt(
     frame = read_frame(dump)
     grains = snapshot_of(frame, case, time_s=0.0)
     restless = "FDNET restless" in (folder / SCREEN).read_text("utf-8", errors="replace")
-    creep = _creep(case, scales, folder, grains) if restless else 0.0
+    creep = creep_of(case, scales, folder, grains) if restless else 0.0
     if len(grains) != count:
         raise LiggghtsError(f"{dump}: {len(grains)} grains, expected {count}: some were lost")
     check_radii(grains, case, dump)
@@ -355,7 +355,7 @@ def _attempt(
     )
 
 
-def _creep(case: Case, scales: Scales, folder: Path, grains: Snapshot) -> float:
+def creep_of(case: Case, scales: Scales, folder: Path, grains: Snapshot) -> float:
     """Root-mean-square speed, m/s, of grains that never came to rest.
 
     A pack that is barely jammed has such soft modes. Raises RestlessError above `MOST_CREEP` grain

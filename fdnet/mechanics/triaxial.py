@@ -582,6 +582,15 @@ def confined(
     return pack, row, restless
 
 
+def _falls_apart(pack: Deformed, test: Triaxial) -> MechanicsError:
+    """What is said of a pack that has no contact left, or whose box has no volume left."""
+    return MechanicsError(
+        f"pack of {len(pack.grains)} grains falls apart under {test.confining:.3g} Pa: its "
+        "contacts open before they bear the stress; take a denser pack, a lower --confining_MPa, "
+        "or bonds"
+    )
+
+
 def _brought_to_rest(
     pack: Deformed,
     material: PackMaterial,
@@ -592,14 +601,19 @@ def _brought_to_rest(
 ) -> tuple[Deformed, LoadStep, bool]:
     """The pack after a strain (3,) and steps at rest, its row, and whether it came to rest.
 
-    Where the strain is nan the stress (3,), Pa, is held.
+    Where the strain is nan the stress (3,), Pa, is held. Raises MechanicsError for a pack that
+    falls apart.
     """
     drag, before = MOST_DRAG, np.inf
     within = 0.1 * test.tolerance * test.confining * 4 * float(pack.grains.radius.mean()) ** 2
     for rests in range(1, test.rests + 1):
         loaded = loaded_pack(pack, material, periodic)
         load = Load(strain=strain, stress=stress, drag=drag * material.normal, within=within)
+        if len(loaded.joints) == 0:
+            raise _falls_apart(pack, test)
         motion, given, taken = balance(loaded, load)
+        if not np.all(given > -1.0):
+            raise _falls_apart(pack, test)
         strain = np.where(np.isnan(strain), np.nan, 0.0)
         pack, forces = carried_out(loaded, motion, given)
         # the bonds that are farthest beyond their strength break

@@ -160,7 +160,7 @@ class Progress:
         if self.show:
             self._draw()
 
-    def _left(self) -> float:
+    def left(self) -> float:
         """Seconds left by the speed of the last third of the steps; 0 where it is not known."""
         step, now = self.clock[-1]
         since = self.clock[0][0] + 2 * (step - self.clock[0][0]) / 3
@@ -171,7 +171,7 @@ class Progress:
         return (self.end - step) * (now - then) / done if done > 0 else 0.0
 
     def _text(self) -> str:
-        left = self._left() if self.clock else 0.0
+        left = self.left() if self.clock else 0.0
         eta = f"~{spoken_time(left)} left" if left else ""
         steps = f"step {_short(str(self.step))} of ~{_short(str(self.end))}"
         return ", ".join(filter(None, (steps, self.note, eta)))

@@ -2,36 +2,40 @@
 
 import math
 import re
+from importlib.resources import files
 
+import jinja2
 import numpy as np
 import pytest
-from builders import tiny
+from bench import drag_text
+from builders import followed, resting_spheres, tiny
+from jinja2 import nodes
 
-from fdnet.dem.deck import render_text, used_variables
-from fdnet.dem.invade_deck import render_invade
+from fdnet.dem.deck import number, render_text, specimen_box, used_variables
+from fdnet.dem.invade_deck import render_decks, render_invade, write_batches
 from fdnet.dem.packing import draw_radii, render_pack
-from fdnet.errors import DeckError
+from fdnet.errors import CaseError, DeckError
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.snapshot import Kind, Snapshot
+from fdnet.spheres.snapshot import Kind
 
 
-def one_grain(case) -> Snapshot:
-    box = np.column_stack([np.zeros(3), case.size_m])
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=box,
-        id=np.array([1]),
-        kind=np.array([Kind.GRAIN]),
-        position=np.array([[2e-4, 8e-4, 8e-4]]),
-        radius=np.array([2.5e-4]),
-        velocity=np.zeros((1, 3)),
-    )
+def grain_of(case):
+    """A single grain, not touching the sides."""
+    return resting_spheres([[2e-4, 8e-4, 8e-4]], 2.5e-4, specimen_box(case), kind=Kind.GRAIN)
+
+
+def invade_deck(*assignments: str, **more):
+    case = tiny(*assignments)
+    return render_invade(case, scales_of(case), grain_of(case), **more)
 
 
 def invade_text(*assignments: str, ranks: int = 1) -> str:
+    return invade_deck(*assignments, ranks=ranks).text
+
+
+def pack_text(*assignments: str) -> str:
     case = tiny(*assignments)
-    return render_invade(case, scales_of(case), one_grain(case), ranks=ranks).text
+    return render_pack(case, scales_of(case), count=66).text
 
 
 def commands(text: str) -> list[str]:
@@ -53,41 +57,75 @@ def test_missing_template_and_variables_are_errors():
 
 def test_templates_hold_no_arithmetic():
     """No operators and no filters: every number is computed in Python."""
-    from importlib.resources import files
-
-    import jinja2
-    from jinja2 import nodes
-
-    forbidden = (
-        nodes.Add,
-        nodes.Sub,
-        nodes.Mul,
-        nodes.Div,
-        nodes.FloorDiv,
-        nodes.Mod,
-        nodes.Pow,
-        nodes.Neg,
-        nodes.Concat,
-        nodes.Filter,
-        nodes.Assign,
-    )
+    sums = (nodes.Add, nodes.Sub, nodes.Mul, nodes.Div, nodes.FloorDiv, nodes.Mod, nodes.Pow)
+    forbidden = (*sums, nodes.Neg, nodes.Concat, nodes.Filter, nodes.Assign)
     for entry in files("liggghts_templates").iterdir():
         if entry.name.endswith(".j2"):
             tree = jinja2.Environment().parse(entry.read_text())
             assert not list(tree.find_all(forbidden)), entry.name
 
 
+def test_each_scheme_of_the_drag_has_its_own_lines_and_no_others():
+    own = {
+        "held": "store/state",
+        "implicit": "couple/cfd/force/implicit CrankNicolson 1.0",
+        "viscous": "fix drag fines viscous",
+    }
+    for scheme in own:
+        text = drag_text(tiny(f"drag.scheme={scheme}"))
+        for other, line in own.items():
+            assert (line in text) == (other == scheme), (scheme, other)
+        assert (" uf " in text) == (scheme != "viscous")
+        assert ("run 0" in text) == (scheme != "viscous")
+    assert has(invade_text(), r"^fix st fines store/state \d+ v_fx")
+    every = invade_text("drag.refresh_steps=1")
+    assert has(every, r"^fix drag fines addforce v_fx v_fy v_fz$")
+    assert not has(every, "store/state")
+    held = invade_text("drag.inertia=schiller-naumann")
+    assert has(held, r"^variable fx atom v_cr\*v_sx$")
+    assert has(held, r"^fix drag fines addforce v_hx v_hy v_hz$")
+
+
 def test_drag_is_stokes_with_the_multiplier():
+    """6 pi mu M r u; upstream less by 6 pi mu M r (u - q), q Darcy's velocity."""
     text = invade_text("drag.multiplier=30")
     value = float(re.search(r"variable fx atom ([-+.\de]+)\*r\*\(f_uf\[1\]-vx\)", text).group(1))
     assert value == pytest.approx(6 * math.pi * 0.05 * 30)
-    assert has(text, r"^fix drag fines addforce")
+    viscous = ("drag.scheme=viscous", "fluid.velocity_m_s=2.0")
+    case = tiny(*viscous, "drag.multiplier=3.0", "drag.upstream=darcy")
+    text, damping = drag_text(case), 6 * math.pi * 0.05 * 3 * 5e-5
+    part = r"(\S+) 0.0 0.0"
+    push, slower = (
+        float(re.search(rf"{one} fines addforce {part}", text).group(1))
+        for one in ("push", "slow")
+    )
+    assert float(re.search(r"drag fines viscous (\S+)", text).group(1)) == pytest.approx(damping)
+    assert push == pytest.approx(damping * 2.0)
+    assert slower == pytest.approx(-damping * 2.0 * (1 - scales_of(case).porosity))
+    assert "region" not in drag_text(tiny(*viscous))
+    case = tiny("drag.scheme=implicit", "fines.radius_mm=[0.04, 0.06]", "fluid.velocity_m_s=2.0")
+    for resume in (False, True):
+        text = drag_text(case, resume)
+        assert f"variable ksl atom {number(6 * math.pi * 0.05)}*r" in text
+        assert "set group fines property/atom Ksl v_ksl" in text
+        assert "set group fines property/atom uf 2.0 0.0 0.0" in text
 
 
-def test_drag_held_for_more_than_a_step_is_stored():
-    assert has(invade_text(), r"^fix st fines store/state \d+ v_fx")
-    assert has(invade_text("drag.refresh_steps=1"), r"^fix drag fines addforce v_fx v_fy v_fz$")
-    assert not has(invade_text("drag.refresh_steps=1"), "store/state")
+def test_what_a_scheme_cannot_do_is_refused():
+    """Each names key and value; what needs a fluid that fdnet computes is said too."""
+    sizes = "fines.radius_mm=[0.04, 0.06]"
+    for keys, message in (
+        (["drag.scheme=viscous", sizes], "needs fines of one size"),
+        (["drag.scheme=implicit", "drag.upstream=darcy"], "keeps one a fine"),
+        (["drag.scheme=implicit", "drag.refresh_steps=5"], "'held', not 'implicit'"),
+        (["drag.scheme=viscous", "drag.refresh_steps=5"], "'held', not 'viscous'"),
+        (["drag.scheme=explicit"], "drag.scheme: 'explicit'"),
+        (["drag.update_travel=0.2"], "drag.update_travel: 0.2 belongs to a drag"),
+        (["drag.crowd=beetstra", "drag.scheme=viscous"], "has one damping for all fines"),
+    ):
+        with pytest.raises(CaseError) as error:
+            tiny(*keys)
+        assert message in str(error.value), keys
 
 
 def test_gravity_is_left_out_when_negligible_and_reported():
@@ -175,19 +213,13 @@ def test_the_neighbour_search_is_the_cases_or_the_measured_best():
 
 
 def test_lost_atoms_are_errors_and_the_end_is_marked():
-    case = tiny()
-    for text in (invade_text(), render_pack(case, scales_of(case), count=66).text):
+    for text in (invade_text(), pack_text()):
         assert has(text, "thermo_modify lost error")
         assert commands(text)[-1] == 'print "DECK_DONE"'
         assert has(text, r"^timestep ")
         assert not has(text, "multi|screen none")
-
-
-def test_the_set_command_never_meets_its_unset_number():
-    case = tiny()
-    text = render_pack(case, scales_of(case), count=66).text
-    assert has(text, r"^set group all density 2650.0 diameter v_d")
-    assert not has(text, r"^set group all diameter v_")
+    assert has(pack_text(), r"^set group all density 2650.0 diameter v_d")
+    assert not has(pack_text(), r"^set group all diameter v_"), "LIGGGHTS takes both at once"
 
 
 def test_pair_matrices_are_symmetric_series_values():
@@ -227,15 +259,13 @@ def test_the_stop_rule_allows_a_share_of_the_inflow():
 @pytest.mark.parametrize(("model", "law"), [("hooke", "hooke/stiffness"), ("hertz", "hertz")])
 def test_pairs_and_walls_have_the_contact_model_of_the_case(model, law):
     """Walls without friction of their own have no tangential model."""
-    text = invade_text(f"contact.model={model}", "box.wall_friction=0.3")
-    assert has(text, rf"^pair_style gran model {law} tangential history tangential_damping off")
-    assert has(text, rf"^fix wy0 fines wall/gran model {law} tangential history primitive type 3")
-    smooth = invade_text(f"contact.model={model}")
-    assert has(smooth, rf"^fix wy0 fines wall/gran model {law} primitive type 3 yplane")
-    case = tiny(f"contact.model={model}")
-    pack = render_pack(case, scales_of(case), count=66).text
-    assert has(pack, rf"^pair_style gran model {law} limitForce on")
-    assert has(pack, rf"^fix wx0 all wall/gran model {law} primitive type 2 xplane")
+    key, history = f"contact.model={model}", f"gran model {law} tangential history"
+    text = invade_text(key, "box.wall_friction=0.3")
+    assert has(text, rf"^pair_style {history} tangential_damping off")
+    assert has(text, rf"^fix wy0 fines wall/{history} primitive type 3")
+    assert has(invade_text(key), rf"^fix wy0 fines wall/gran model {law} primitive type 3 yplane")
+    assert has(pack_text(key), rf"^pair_style gran model {law} limitForce on")
+    assert has(pack_text(key), rf"^fix wx0 all wall/gran model {law} primitive type 2 xplane")
 
 
 def test_moduli_that_liggghts_would_refuse_are_said_to_be_meant():
@@ -253,7 +283,102 @@ def test_moduli_that_liggghts_would_refuse_are_said_to_be_meant():
     assert not has(invade_text(), "_particles yes")
 
 
-def test_held_drag_at_a_finite_reynolds_number_stores_the_force():
-    held = invade_text("drag.inertia=schiller-naumann")
-    assert has(held, r"^variable fx atom v_cr\*v_sx$")
-    assert has(held, r"^fix drag fines addforce v_hx v_hy v_hz$")
+def test_contact_options_that_are_not_asked_for_are_left_out_and_named():
+    words, wall = "rolling|ohesi|limitForce off|cohere", "box.wall_friction=0.3"
+    assert not has(invade_text(wall), words)
+    options = ("loss of rebound in the liquid", "rolling resistance", "cohesion")
+    for what in options:
+        assert f"# left out: {what} (not asked for)" in invade_text(wall)
+    keys = ("contact.rolling_friction=0.1", "contact.cohesion_J_m3=1e4", "contact.model=hertz")
+    keys += ("contact.restitution=liquid",)
+    text, plain = invade_text(*keys, wall), invade_text(*keys)
+    model = "hertz tangential history cohesion sjkr rolling_friction epsd2"
+    assert has(text, f"^pair_style gran model {model} tangential_damping off limitForce off$")
+    assert has(text, f"^fix wy0 fines wall/gran model {model} primitive type 3")
+    assert has(text, "^fix roll .* 3 " + " ".join(["0.1"] * 9))
+    assert has(text, "^fix cohere .* 3 0.0 10000.0 0.0 10000.0 10000.0 10000.0 0.0 10000.0 0.0")
+    assert has(plain, "^fix wy0 fines wall/gran model hertz cohesion sjkr primitive")
+    assert not any(f"# left out: {what}" in text for what in options)
+    assert not has(pack_text(*keys), words), "grains settle without them"
+    wet = invade_text(*keys[2:], "fluid.velocity_m_s=1.0")
+    assert has(wet, r"^fix bounce .*peratomtypepair 3 0\.52\d+ 0\.0501\d* 0\.52\d+ 0\.0501")
+
+
+def test_all_forces_of_a_driven_deck_are_scaled_alike():
+    keys = ("well={radius_mm=108.0, drainage_radius_m=100.0}", "drag.scheme=viscous")
+    keys += ("gravity.mode=on", "run.duration_ms=20.0")
+
+    def forces(*more: str) -> list[float]:
+        lines = invade_text(*keys, *more).splitlines()
+        starts = ("fix push", "fix grav")
+        return [float(line.split()[4]) for one in starts for line in lines if line.startswith(one)]
+
+    speed = scales_of(tiny(keys[0])).interstitial_velocity
+    fast = forces(f"drag.drive_velocity_m_s={4 * speed}")
+    assert fast == pytest.approx([4 * one for one in forces()], rel=1e-12)
+    assert len(fast) == 2
+
+
+def test_the_deck_watches_the_overlap_where_it_can_and_says_where_it_cannot():
+    assert "fix overlap all print 50 " in invade_deck().text
+    for deck, why in (
+        (invade_deck("grains.motion=mobile"), "pairs of grains"),
+        (invade_deck("fines.radius_mm=[0.04,0.05]"), "unequal"),
+        (invade_deck(packed=False), "once they are packed"),
+    ):
+        assert "compute" not in deck.text
+        left = [one.why for one in deck.left_out if one.what == "overlap between checkpoints"]
+        assert why in left[0]
+
+
+BATCHED = ("fines.supply=batches", "fines.count=900", "run.checkpoint_ms=0.005")
+
+
+def test_the_deck_takes_each_batch_in_once_and_gives_it_its_drag(tmp_path):
+    """LIGGGHTS stores nothing for atoms that come later: they would feel no drag."""
+    for keys, sets, stored in (
+        (("drag.scheme=viscous",), set(), []),
+        (("drag.scheme=implicit",), {"uf", "Ksl"}, []),
+        (("drag.scheme=held",), {"uf"}, ["v_fx v_fy v_fz"]),
+        (("drag.refresh_steps=1",), {"uf"}, []),
+    ):
+        case, folder = tiny(*BATCHED, *keys), tmp_path / keys[0]
+        folder.mkdir()
+        scales = scales_of(case)
+        write_batches(case, scales, grain_of(case), folder)
+        parts = sorted((folder / "supply").glob("*.in"))
+        last = len(parts) + 1
+        assert {one.name for one in parts} == {f"batch_{n}.in" for n in range(2, last + 1)}
+        text = render_invade(case, scales, grain_of(case)).text
+        assert f'if "${{chunk}} < 2 || ${{chunk}} > {last}" then "jump SELF fed"' in text
+        batch = (folder / "supply" / "batch_2.in").read_text()
+        starts = [line.split() for line in batch.splitlines()]
+        given = [one[4] for one in starts if one[:4] == ["set", "group", "batch", "property/atom"]]
+        assert set(given) == sets, keys
+        assert any(one[:3] == ["velocity", "batch", "set"] for one in starts)
+        again = re.findall(r"(?m)^unfix drag\nunfix st\nfix st fines store/state \d+ (.*)$", batch)
+        assert again == stored, keys
+        assert len(re.findall("(?m)^fix drag fines addforce", batch)) == len(again)
+    assert "batch_" not in invade_text("fines.supply=batches", "fines.count=20"), "one batch"
+
+
+def test_render_shows_the_coupled_parts_with_what_it_is_fed_and_replaces_nothing(tmp_path):
+    coupled = tiny("drag.crowd=beetstra", "fines.supply=batches", "run.checkpoint_ms=0.05")
+    render_decks(coupled, tmp_path / "coupled")
+    folder = tmp_path / "coupled" / "invade"
+    text = (folder / "in.invade").read_text()
+    assert "jump" not in text
+    for name in ("ask.in", "fluid.in", "checkpoint.in"):
+        assert f"include {name}" in text
+        theirs = tmp_path / f"theirs {name}"
+        (theirs / "invade").mkdir(parents=True)
+        (theirs / "invade" / name).write_text("mine")
+        with pytest.raises(CaseError, match=rf"invade/{name}: is there already"):
+            render_decks(coupled, theirs)
+        assert [one.read_text() for one in theirs.rglob("*") if one.is_file()] == ["mine"]
+    assert "set group fines property/atom cd v_cd" in (folder / "fluid.in").read_text()
+    assert "f_uf" not in (folder / "ask.in").read_text()
+    render_decks(followed(), tmp_path / "followed")
+    assert "f_uf[3]" in (tmp_path / "followed/invade/ask.in").read_text()
+    render_decks(tiny(), tmp_path / "plain")
+    assert [one.name for one in (tmp_path / "plain" / "invade").iterdir()] == ["in.invade"]

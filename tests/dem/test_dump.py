@@ -1,8 +1,8 @@
 """The dump parser: what it reads exactly, and every way a file can be broken."""
 
+import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from fdnet.errors import DumpError
@@ -33,19 +33,12 @@ def test_full_precision_any_order_and_several_frames():
     assert first.column("x").tolist() == [-3e-9, 0.12345678901234568]
     assert first.box.tolist() == [[-1, 1], [0, 2], [0, 3]]
     assert not first.rows.flags.writeable
-
-
-def test_rows_without_trailing_space():
     assert parse(frame(0, ["1 1 0.5", "2 1 0.25"]))[0].column("x").tolist() == [0.5, 0.25]
-
-
-def test_empty_frame():
     assert parse(frame(0, []))[0].rows.shape == (0, 3)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_broken_files_are_named_by_line_and_step(tmp_path: Path):
+    for text, message in (
         (
             frame(4000, ["1 1 0.5 "], count=3),
             r"d\.dump:10: step 4000: 1 of 3 rows, then the file ends",
@@ -69,14 +62,12 @@ def test_empty_frame():
             frame(0, ["1 1 1 "]).replace("\n1\nITEM: BOX", "\n-4\nITEM: BOX"),
             "number of atoms is '-4'",
         ),
-    ],
-)
-def test_broken_files_are_named_by_line_and_step(text, message):
-    with pytest.raises(DumpError, match=message):
-        parse(text)
-
-
-def test_missing_file_and_wrong_number_of_frames(tmp_path: Path):
+    ):
+        with pytest.raises(DumpError) as error:
+            parse(text)
+        assert re.search(message, str(error.value)), text
+    with pytest.raises(DumpError, match="no column radius among id type x"):
+        parse(frame(0, ["1 1 1 "]))[0].column("radius")
     with pytest.raises(DumpError, match="cannot be read"):
         read_dump(tmp_path / "none")
     (tmp_path / "d").write_text("")
@@ -84,21 +75,8 @@ def test_missing_file_and_wrong_number_of_frames(tmp_path: Path):
         read_frame(tmp_path / "d")
 
 
-def test_missing_column():
-    with pytest.raises(DumpError, match="no column radius among id type x"):
-        parse(frame(0, ["1 1 1 "]))[0].column("radius")
-
-
 def test_every_cut_of_a_file_is_noticed():
     text = frame(3, ["1 1 0.5 ", "2 1 0.25 "]).encode()
     for length in range(1, len(text)):
         with pytest.raises(DumpError):
             list(parse_dump(text[:length], "cut"))
-
-
-def test_many_rows_equal_numpy():
-    rng = np.random.default_rng(0)
-    values = rng.normal(size=(500, 3))
-    rows = [f"{i + 1} {v[0]:.17g} {v[1]:.17g} " for i, v in enumerate(values)]
-    read = parse(frame(0, rows))[0].rows
-    assert np.array_equal(read[:, 1:], values[:, :2])

@@ -1,313 +1,123 @@
-"""Invasions by the real binary: every fine is counted, a cut run goes on as if never cut."""
+"""Invasions by the real binary: every fine is counted, overlaps are seen, the end is told."""
 
+import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import tiny
+from bench import bench
+from builders import resting_spheres, tiny
+from cut_and_continue import StopError
 
-from fdnet.dem import checkpoint, supply
+from fdnet.dem import invade_deck
 from fdnet.dem.checkpoint import (
     Checkpoint,
-    Checkpoints,
-    file_digest,
+    Deepest,
+    check_counts,
+    cut_watch,
+    deepest_of,
     plug_allowance,
-    read_history,
+    read_watch,
+    watch_variables,
+    write_watch_parts,
 )
+from fdnet.dem.deck import number, render_text, specimen_box
+from fdnet.dem.invade_deck import write_invade_inputs
 from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Launch
-from fdnet.dem.packing import make_pack
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.supply import (
-    CLEARANCE,
-    SURE_CROWDING,
-    crowding,
+    batches_of,
     place_batches,
-    refuse_crowded_supply,
 )
 from fdnet.errors import CaseError, LiggghtsError
-from fdnet.run import pipeline
+from fdnet.run.pipeline import RunOptions, run_stages
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
-HISTORY_HEADER = ",".join(Checkpoint._fields)
-
-
-def points(folder, case) -> Checkpoints:
-    """The checkpoints of an invasion."""
-    return Checkpoints(folder=folder, digest=case.digest("invade"))
-
-
-def the_slab(case, scales, grains):
-    """All fines of a slab that is there at the start."""
-    assert case.fines.supply == "slab"
-    return next(place_batches(case, scales, grains))
 
 
 @pytest.fixture(scope="module")
-def packed(binary, tmp_path_factory):
-    """Grains of the tiny case, with walls and with periodic sides."""
-    grains = {}
-    for sides in ("walls", "periodic"):
-        case = tiny(f"box.sides={sides}")
-        grains[sides] = make_pack(
-            case, scales_of(case), tmp_path_factory.mktemp(sides), Launch(binary=binary)
-        ).grains
-    return grains
+def go(binary, grains_of):
+    """Invade the pack of a case in a folder."""
+
+    def invaded(case, folder, **launch):
+        grains, launch = grains_of(case), Launch(binary=binary, **launch)
+        return invade(case, scales_of(case), grains, folder, launch)
+
+    return invaded
 
 
 @pytest.mark.parametrize(
-    "assignments",
-    [[], ["fines.radius_mm=[0.02,0.06]"], ["box.sides=periodic", "fines.concentration=0.3"]],
-)
-def test_fines_start_clear_of_everything(packed, assignments):
-    case = tiny(*assignments)
-    scales = scales_of(case)
-    grains = packed[case.box.sides]
-    fines = the_slab(case, scales, grains)
-    assert len(fines) == scales.supplied_count
-    pairs, _ = touching_pairs(grains.joined(fines), case.periodic, gap=0.5 * (CLEARANCE - 1))
-    assert not np.any(grains.joined(fines).kind[pairs] == Kind.FINE)
-    low = fines.position[:, 0].min()
-    assert np.min(grains.position[:, 0] - grains.radius) > fines.position[:, 0].max()
-    assert fines.position[:, 0].max() - low <= scales.slab_length
-    assert np.all(fines.velocity[:, 0] == scales.upstream_velocity)
-
-
-def test_a_slab_that_cannot_hold_the_fines_is_an_error(packed):
-    case = tiny("fines={radius_mm=0.05, count=300, concentration=0.3, supply='slab'}")
-    crowded = case.model_copy(
-        update={"fines": case.fines.model_copy(update={"concentration": 0.6})}
-    )
-    with pytest.raises(CaseError, match=r"fines\.concentration: 0\.6 leaves"):
-        the_slab(crowded, scales_of(crowded), packed["walls"])
-
-
-@pytest.mark.parametrize("radius_mm", ["0.05", "[0.015,0.05]", "0.2"])
-@pytest.mark.parametrize("sides", ["walls", "periodic"])
-@pytest.mark.parametrize("length", [1, 20])
-def test_every_fine_finds_a_place_up_to_the_sure_crowding(monkeypatch, radius_mm, sides, length):
-    """Slabs of 1 and 20 diameters, just above the limit; below it nothing is drawn beforehand."""
-    high = float(radius_mm.strip("[]").rsplit(",", 1)[-1])
-    case = tiny(
-        f"box.sides={sides}", f"fines={{radius_mm={radius_mm}, slab_mm={2 * high * length}}}"
-    )
-    fines = case.fines.model_copy(update={"concentration": 1.0})
-    fines = fines.model_copy(
-        update={
-            "concentration": SURE_CROWDING / crowding(case.model_copy(update={"fines": fines}))
-        }
-    )
-    for seed in range(5):
-        full = fines.model_copy(update={"concentration": 1.001 * fines.concentration})
-        full = case.model_copy(update={"fines": full, "seed": seed})
-        assert crowding(full) > SURE_CROWDING
-        refuse_crowded_supply(full, scales_of(full))
-    monkeypatch.setattr(supply, "_draw", None)
-    sure = case.model_copy(
-        update={"fines": fines.model_copy(update={"concentration": 0.999 * fines.concentration})}
-    )
-    refuse_crowded_supply(sure, scales_of(sure))
-
-
-def test_crowding_of_equal_fines_far_from_walls_is_their_concentration():
-    assert crowding(tiny("box.sides=periodic")) == pytest.approx(tiny().fines.concentration)
-    assert crowding(tiny()) == pytest.approx(tiny().fines.concentration * (1.6 / 1.5) ** 2)
-
-
-def test_crowding_of_unequal_fines_by_quadrature():
-    radius = np.linspace(0.02, 0.06, 100_001)
-    shut = np.mean((0.06 + radius) ** 3) / (8 * np.mean(radius**3))
-    case = tiny("box.sides=periodic", "fines.radius_mm=[0.02,0.06]")
-    assert crowding(case) == pytest.approx(case.fines.concentration * shut, rel=1e-4)
-
-
-def test_a_begun_invasion_is_not_tried_out_again(tmp_path, monkeypatch):
-    """Its fines are placed already: a folder with a checkpoint is not refused for its supply."""
-    monkeypatch.setattr(pipeline, "refuse_crowded_supply", refuse_all)
-    (tmp_path / "run" / "invade").mkdir(parents=True)
-    history = tmp_path / "run" / "invade" / "history.csv"
-    options = pipeline.RunOptions(out=tmp_path / "run", show_progress=False)
-    for text, message in (
-        (HISTORY_HEADER + "\n", "crowded"),
-        (HISTORY_HEADER + "\n1,2,3,4,5,6,7,8\n", "holds no fdnet run"),
-    ):
-        history.write_text(text)
-        with pytest.raises(CaseError, match=message):
-            pipeline.run_stages(tiny(), options)
-    with pytest.raises(CaseError, match="crowded"):
-        pipeline.run_stages(tiny(), replace(options, force=True))
-
-
-def refuse_all(*_):
-    raise CaseError("crowded")
-
-
-@pytest.mark.parametrize(
-    "assignments",
+    "keys",
     [
-        [],
-        ["box.sides=periodic"],
+        ["box.sides=periodic", "drag.refresh_steps=1"],
         ["grains.motion=mobile"],
-        ["drag.refresh_steps=1"],
-        ["drag.upstream=darcy"],
         ["drag.scheme=viscous", "drag.upstream=darcy"],
         ["drag.scheme=implicit", "fines.radius_mm=[0.02,0.05]"],
         ["fines.radius_mm=[0.02,0.05]", "fines.friction=0.0", "run={duration_ms=0.25}"],
     ],
 )
-def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(
-    binary, packed, tmp_path, assignments
-):
-    case = tiny("run.cap_ms=0.6", *assignments)
-    scales = scales_of(case)
-    result = invade(case, scales, packed[case.box.sides], tmp_path, Launch(binary=binary))
+def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(go, tmp_path, keys):
+    case = tiny("run.cap_ms=0.6", *keys)
+    result = go(case, tmp_path)
     for row in result.history:
-        assert row.upstream + row.invaded + row.passed == scales.supplied_count
+        assert row.upstream + row.invaded + row.passed == scales_of(case).supplied_count
     x = result.damaged.fines().position[:, 0]
     assert np.count_nonzero((x >= 0) & (x < case.size_m[0])) == result.history[-1].invaded
     assert result.max_overlap < 0.1
-    assert result.stop_reason in {"plugged", "duration", "supply_exhausted", "cap"}
     assert (result.stop_reason == "duration") == (case.run.duration_ms is not None)
 
 
-def test_fines_of_one_micrometre_invade(binary, packed, tmp_path):
-    """A size ratio of 1/250 and steps of 0.1 ns: all are counted, and move with the fluid."""
-    case = tiny("fines={radius_mm=0.001, count=20}", "run={duration_ms=0.02}")
-    scales = scales_of(case)
-    result = invade(case, scales, packed["walls"], tmp_path, Launch(binary=binary))
-    fines = result.damaged.fines()
-    assert len(fines) == 20
-    assert fines.velocity[:, 0].max() == pytest.approx(scales.interstitial_velocity, rel=1e-6)
-    assert result.max_overlap < 0.03
-
-
 @pytest.mark.parametrize(
-    "assignment",
+    ("scheme", "forces"),
     [
-        "run.skin_mm=0.01",
-        "run.skin_mm=0.25",
-        "run.neighbour_bin_mm=0.05",
-        "run.neighbour_bin_mm=1.6",
+        ("implicit", ()),
+        ("held", ("drag.inertia=schiller-naumann", "drag.pressure_gradient=true")),
     ],
 )
-def test_the_neighbour_search_changes_time_not_motion(binary, packed, tmp_path, assignment):
-    """It changes the order of sums: before chaos grows, positions agree to 1e-6 of a fine."""
-    ends = []
-    for name, extra in (("own", [assignment]), ("default", [])):
-        case = tiny("run.duration_ms=0.04", *extra)
-        result = invade(
-            case, scales_of(case), packed["walls"], tmp_path / name, Launch(binary=binary)
-        )
-        assert result.max_overlap > 0.01
-        ends.append(result.damaged.position)
-    assert np.allclose(ends[0], ends[1], rtol=0, atol=1e-10)
+def test_a_batched_invasion_accounts_for_every_fine_and_resumes(go, tmp_path, scheme, forces):
+    keys = ("fines.supply=batches", "fines.count=900", "run.checkpoint_ms=0.005")
+    case = tiny(*keys, f"drag.scheme={scheme}", "run.cap_ms=0.1", "fines.friction=0.2", *forces)
+    whole, batches = go(case, tmp_path / "whole"), batches_of(case, scales_of(case))
+    last = whole.history[-1]
+    assert len(batches.counts) > 5
+    assert (
+        whole.supplied
+        == batches.supplied(batches.entered_at(last.chunk))
+        == last.upstream + last.invaded + last.passed
+    )
+    assert whole.max_overlap < (0.15 if forces else 0.1)
 
+    def stop(line: str) -> None:
+        if line.startswith("FDNET checkpoint 4 "):
+            raise StopError
 
-def test_fixed_grains_do_not_move_and_mobile_ones_do(binary, packed, tmp_path):
-    grains = packed["walls"]
-    for motion in ("fixed", "mobile"):
-        case = tiny(f"grains.motion={motion}", "run.duration_ms=0.2")
-        result = invade(case, scales_of(case), grains, tmp_path / motion, Launch(binary=binary))
-        moved = np.max(np.abs(result.damaged.grains().position - grains.position))
-        assert (moved > 0) == (motion == "mobile")
-        assert moved < 0.2 * 0.25e-3
-
-
-def test_passed_fines_are_removed_and_counted(binary, packed, tmp_path):
-    case = tiny("fines.radius_mm=0.02", "fines.friction=0.0", "fines.count=200", "run.cap_ms=3.0")
-    result = invade(case, scales_of(case), packed["walls"], tmp_path, Launch(binary=binary))
-    assert result.history[-1].passed > 0
-    assert len(result.damaged.fines()) == 200 - result.history[-1].passed
-    assert result.stop_reason == "supply_exhausted"
-    assert any("empty slab" in warning for warning in result.warnings)
-
-
-def test_every_stop_reason_is_told(binary, packed, tmp_path):
-    cases = {"cap": tiny("run.cap_ms=0.05"), "plugged": tiny("fines={radius_mm=0.12, count=60}")}
-    for reason, case in cases.items():
-        result = invade(
-            case, scales_of(case), packed["walls"], tmp_path / reason, Launch(binary=binary)
-        )
-        assert result.stop_reason == reason
-
-
-def test_broken_checkpoints_are_passed_over(binary, packed, tmp_path):
-    case = tiny("run.cap_ms=0.3")
-    scales, grains = scales_of(case), packed["walls"]
-    whole = invade(case, scales, grains, tmp_path, Launch(binary=binary))
-    last, before = whole.history[-1], whole.history[-2]
-    dump = tmp_path / "post" / f"invade_{last.step}.dump"
-    whole_dump = dump.read_bytes()
-    dump.write_bytes(whole_dump[:-40])
-    assert points(tmp_path, case).last() == before
-    text = whole_dump.replace(b"ITEM: NUMBER OF ATOMS\n300\n", b"ITEM: NUMBER OF ATOMS\n299\n")
-    assert text != whole_dump
-    dump.write_bytes(text[: text.rstrip(b"\n").rindex(b"\n") + 1])
-    assert points(tmp_path, case).last() == before
-    (tmp_path / "post" / f"invade_{before.step}.restart").write_bytes(b"")
-    assert points(tmp_path, case).last() is None
-    again = invade(case, scales, grains, tmp_path, Launch(binary=binary))
-    assert np.array_equal(again.damaged.position, whole.damaged.position)
-
-
-def test_a_restart_cut_by_a_full_disk_is_set_aside(binary, packed, tmp_path):
-    case = tiny("run.cap_ms=0.3")
-    scales, grains = scales_of(case), packed["walls"]
-    whole = invade(case, scales, grains, tmp_path, Launch(binary=binary))
-    rows = (tmp_path / "history.csv").read_text().splitlines(keepends=True)
-    (tmp_path / "history.csv").write_text("".join(rows[:-1]))
-    kept = whole.history[-2]
-    restart = tmp_path / "post" / f"invade_{kept.step}.restart"
-    restart.write_bytes(restart.read_bytes()[: int(0.9 * restart.stat().st_size)])
-    cut = points(tmp_path, case).record(kept.step)._replace(restart=file_digest(restart))
-    points(tmp_path, case).store(kept.step, cut)
-    assert points(tmp_path, case).last() == kept
-    again = invade(case, scales, grains, tmp_path, Launch(binary=binary))
+    with pytest.raises(StopError):
+        go(case, tmp_path / "cut", follow=stop)
+    for lost in [*(tmp_path / "cut" / "supply").glob("batch_1?.*")]:
+        lost.unlink()
+    again = go(case, tmp_path / "cut")
     assert again.history == whole.history
     assert np.array_equal(again.damaged.position, whole.damaged.position)
 
 
-def test_fines_that_vanish_are_an_error(packed, tmp_path):
-    case = tiny()
-    (tmp_path / "post").mkdir()
-    row = checkpoint.Checkpoint(
-        chunk=1,
-        step=10,
-        upstream=200,
-        invaded=90,
-        passed=5,
-        removed_upstream=0,
-        most_crossed=95,
-        quiet=0,
-    )
-    damaged = packed["walls"].joined(the_slab(case, scales_of(case), packed["walls"]))
-    with pytest.raises(LiggghtsError, match="fines inside"):
-        checkpoint.check_counts(tmp_path, row, damaged, 300)
-    row = checkpoint.Checkpoint(
-        chunk=1,
-        step=10,
-        upstream=300,
-        invaded=0,
-        passed=0,
-        removed_upstream=0,
-        most_crossed=0,
-        quiet=0,
-    )
-    with pytest.raises(LiggghtsError, match="is not the 301 supplied"):
-        checkpoint.check_counts(tmp_path, row, damaged, 301)
+def test_every_stop_reason_is_told_and_fines_that_pass_are_removed(go, tmp_path):
+    passing = ("fines.radius_mm=0.02", "fines.friction=0.0", "fines.count=200", "run.cap_ms=3.0")
+    for reason, keys in {
+        "cap": ("run.cap_ms=0.05",),
+        "plugged": ("fines={radius_mm=0.12, count=60}",),
+        "supply_exhausted": passing,
+    }.items():
+        result = go(tiny(*keys), tmp_path / reason)
+        assert result.stop_reason == reason
+    assert result.history[-1].passed > 0
+    assert len(result.damaged.fines()) == 200 - result.history[-1].passed
+    assert any("empty slab" in warning for warning in result.warnings)
 
 
-def test_history_with_a_half_written_line(tmp_path: Path):
-    (tmp_path / "history.csv").write_text("chunk,step\n1,10,5,5,0,0,5,0\n2,20,4,")
-    assert [row.chunk for row in read_history(tmp_path)] == [1]
-    with pytest.raises(LiggghtsError, match="no checkpoint recorded"):
-        read_history(tmp_path / "none")
-
-
-def test_a_trickle_may_count_as_plugged(binary, packed, tmp_path):
+def test_a_trickle_may_count_as_plugged(go, tmp_path):
     """With `plug_rate` the end comes at the first plug time with no more crossings than that."""
     case = tiny(
         "fines.count=900",
@@ -316,9 +126,7 @@ def test_a_trickle_may_count_as_plugged(binary, packed, tmp_path):
         "run.plug_rate=0.5",
         "run.cap_ms=2",
     )
-    scales, grains = scales_of(case), packed["walls"]
-    result = invade(case, scales, grains, tmp_path, Launch(binary=binary))
-    allowed = plug_allowance(case, scales)
+    result, allowed = go(case, tmp_path), plug_allowance(case, scales_of(case))
     crossed = [row.invaded + row.passed for row in result.history]
     assert result.stop_reason == "plugged"
     assert 0 < crossed[-1] - crossed[-6] <= allowed
@@ -327,3 +135,180 @@ def test_a_trickle_may_count_as_plugged(binary, packed, tmp_path):
         for n in range(5, len(crossed) - 1)
         if result.history[n].quiet == 0
     )
+
+
+def test_fines_of_one_micrometre_invade(go, tmp_path):
+    """A size ratio of 1/250 and steps of 0.1 ns: all are counted, and move with the fluid."""
+    case = tiny("fines={radius_mm=0.001, count=20}", "run={duration_ms=0.02}")
+    result = go(case, tmp_path)
+    fines, velocity = result.damaged.fines(), scales_of(case).interstitial_velocity
+    assert len(fines) == 20
+    assert fines.velocity[:, 0].max() == pytest.approx(velocity, rel=1e-6)
+    assert result.max_overlap < 0.03
+
+
+def test_the_neighbour_search_changes_time_not_motion(go, tmp_path):
+    """It changes the order of sums: before chaos grows, positions agree to 1e-6 of a fine."""
+    plain = go(tiny("run.duration_ms=0.04"), tmp_path / "plain")
+    assert plain.max_overlap > 0.01
+    for key in ("skin_mm=0.01", "skin_mm=0.25", "neighbour_bin_mm=0.05", "neighbour_bin_mm=1.6"):
+        own = go(tiny("run.duration_ms=0.04", f"run.{key}"), tmp_path / key)
+        near = np.allclose(own.damaged.position, plain.damaged.position, rtol=0, atol=1e-10)
+        assert near, key
+
+
+def test_fixed_grains_do_not_move_and_mobile_ones_do(go, grains_of, tmp_path):
+    for motion in ("fixed", "mobile"):
+        case = tiny(f"grains.motion={motion}", "run.duration_ms=0.2")
+        ends = go(case, tmp_path / motion).damaged.grains().position
+        moved = np.max(np.abs(ends - grains_of(case).position))
+        assert (moved > 0) == (motion == "mobile")
+        assert moved < 0.2 * 0.25e-3
+
+
+def test_a_begun_invasion_is_not_tried_out_again(tmp_path):
+    """Its fines are placed already: a folder with a checkpoint is not refused for its supply."""
+    keys = ("fines.count=200", "fines.concentration=0.3", "fines.radius_mm=0.2")
+    case, leaves = tiny(*keys), "0.3 leaves"
+    history = tmp_path / "run" / "invade" / "history.csv"
+    history.parent.mkdir(parents=True)
+    options = RunOptions(out=tmp_path / "run", show_progress=False)
+    begun = ",".join(Checkpoint._fields) + "\n"
+    for text, force, message in (
+        (begun, False, leaves),
+        (begun + "1,2,3,4,5,6,7,8\n", False, "holds no fdnet run"),
+        (begun + "1,2,3,4,5,6,7,8\n", True, leaves),
+    ):
+        history.write_text(text)
+        with pytest.raises(CaseError, match=message):
+            run_stages(case, replace(options, force=force))
+
+
+def test_fines_that_vanish_are_an_error(grains_of, tmp_path):
+    case = tiny()
+    (tmp_path / "post").mkdir()
+    grains = grains_of(case)
+    damaged = grains.joined(next(place_batches(case, scales_of(case), grains)))
+    for counts, supplied, message in (
+        ((200, 90, 5), 300, "fines inside"),
+        ((300, 0, 0), 301, "is not the 301 supplied"),
+    ):
+        row = Checkpoint(1, 10, *counts, 0, 0, 0)
+        with pytest.raises(LiggghtsError, match=message):
+            check_counts(tmp_path, row, damaged, supplied)
+
+
+# ------------------------------------------------------------------------------------------------
+# The overlap of fines: it is measured right, changes no motion, warns or stops.
+
+
+def test_the_watch_never_writes_more_than_some_hundred_rows_a_chunk(grains_of):
+    for case in (tiny(), tiny("run.stiffness_N_m=nominal")):
+        scales = scales_of(case)
+        watch = watch_variables(case, scales, grains_of(tiny()))
+        assert scales.checkpoint_steps / watch["every"] < 210
+
+
+def test_what_was_seen_is_read_line_by_line(tmp_path):
+    assert list(read_watch(tmp_path)) == []
+    (tmp_path / "overlap.csv").write_text(
+        "# step,overlap\n50,-1e+24\n100,0.02\n# step,overlap\n150,0.01\n1,x\n200,0."
+    )
+    seen = list(read_watch(tmp_path))
+    assert [(row.step, row.fraction) for row in seen] == [
+        (50, 0.0),
+        (100, 0.02),
+        (150, 0.01),
+        (1, 0.0),
+    ]
+    assert deepest_of(seen) == Deepest(step=100, fraction=0.02)
+    assert deepest_of([]) == Deepest(step=0, fraction=0.0)
+    cut_watch(tmp_path, 100)
+    assert [row.step for row in read_watch(tmp_path)] == [50, 100, 1]
+
+
+def test_in_turn_every_grain_is_watched_with_the_fines_and_none_that_it_touches(
+    binary, grains_of, tmp_path
+):
+    """LIGGGHTS writes which spheres are watched in two rounds of chunks."""
+    case = tiny("run.cap_ms=0.2")
+    grains = grains_of(case)
+    groups = watch_variables(case, scales_of(case), grains)["turns"]
+    deck = write_invade_inputs(case, scales_of(case), grains, tmp_path).text
+    text = deck[: deck.index("region specimen")] + "run 0\n"
+    for chunk in range(1, 2 * groups + 1):
+        text += f"variable chunk equal {chunk}\n" + render_text("watched.in.j2", {})
+        text += f"write_dump watched custom {chunk}.dump id type\n"
+    (tmp_path / "in.turns").write_text(text + 'print "DECK_DONE"\n')
+    run_deck(tmp_path, "in.turns", Launch(binary=binary))
+    pairs, _ = touching_pairs(grains, case.periodic)
+    assert len(pairs) > len(grains)
+    rounds: list[list[int]] = [[], []]
+    for chunk in range(1, 2 * groups + 1):
+        table = np.loadtxt(tmp_path / f"{chunk}.dump", skiprows=9, dtype=int)
+        seen = table[table[:, 1] == 1, 0]
+        assert np.sum(table[:, 1] == 2) == case.fines.count
+        assert not np.any(np.isin(grains.id[pairs], seen).all(axis=1))
+        rounds[(chunk - 1) // groups] += seen.tolist()
+    for watched in rounds:
+        assert sorted(watched) == sorted(grains.id.tolist())
+
+
+def test_the_deck_sees_the_overlap_of_an_impact(tmp_path):
+    """v sqrt(m/k) of an undamped spring, over the fine's diameter; before and after it nothing.
+
+    The grain that is hit overlaps another one by a third, which is no overlap of a fine.
+    """
+    case = tiny("fines.damping_ratio=0.0", "grains.damping_ratio=0.0", "fines.friction=0.0")
+    scales, radius, speed, box = scales_of(case), 0.05e-3, 2.0, specimen_box(case)
+    places = [[2e-3, 8e-4, 8e-4], [2e-3 + 3.3e-4, 8e-4, 8e-4]]
+    pair = resting_spheres(places, 2.5e-4, box, kind=Kind.GRAIN)
+    place = [[2e-3 - 3.05e-4, 8e-4, 8e-4]]
+    fine = resting_spheres(place, radius, box, kind=Kind.FINE, first=3)
+    write_watch_parts(case, pair, tmp_path)
+    watch = watch_variables(case, scales, pair) | {"every": 2}
+    text = f"fix still grains freeze\nvelocity fines set {number(speed)} 0 0 units box\n"
+    text += render_text("_overlap.in.j2", {"overlap": watch})
+    bench(
+        case,
+        pair.joined(fine),
+        tmp_path,
+        density=[2650.0, 2650.0, 2146.0],
+        step=scales.time_step / 5,
+        steps=2000,
+        every=2000,
+        commands=text + "variable chunk equal 1\n" + render_text("watched.in.j2", {}),
+        moving="fines",
+    )
+    seen = list(read_watch(tmp_path))
+    mass, stiffness = 4 / 3 * math.pi * radius**3 * 2146, scales.contacts["grain-fine"]
+    expected = speed * math.sqrt(mass / stiffness.normal_stiffness) / (2 * radius)
+    assert deepest_of(seen).fraction == pytest.approx(expected, rel=2e-3)
+    assert seen[0].fraction == seen[-1].fraction == 0.0
+
+
+def test_watching_does_not_move_a_single_bit(go, tmp_path, monkeypatch):
+    case = tiny("run.cap_ms=0.2")
+    watched = go(case, tmp_path / "watched")
+    monkeypatch.setattr(invade_deck, "watch_variables", lambda *_: None)
+    alone = go(case, tmp_path / "alone")
+    assert not (tmp_path / "alone" / "overlap.csv").exists()
+    assert np.array_equal(watched.damaged.position, alone.damaged.position)
+    assert watched.overlap == deepest_of(read_watch(tmp_path / "watched"))
+    assert watched.max_overlap > alone.max_overlap > 0
+
+
+@pytest.mark.parametrize("motion", ["fixed", "mobile"])
+def test_a_run_past_the_limit_stops_when_asked_and_goes_on_when_told(go, tmp_path, motion):
+    keys = ("run.cap_ms=0.3", "run.max_overlap=0.03", f"grains.motion={motion}")
+    for _ in range(2):
+        with pytest.raises(LiggghtsError, match=r"overlapped by .* at step \d+ .*at checkpoint"):
+            go(tiny(*keys, "run.on_overlap=stop"), tmp_path / "run")
+    whole, again = (go(tiny(*keys), tmp_path / name) for name in ("whole", "run"))
+    assert again.history == whole.history
+    assert np.array_equal(again.damaged.position, whole.damaged.position)
+    assert again.overlap == whole.overlap
+    assert list(read_watch(tmp_path / "run")) == list(read_watch(tmp_path / "whole"))
+    assert again.max_overlap > 0.03
+    slow = ("run.cap_ms=0.2", "fluid.velocity_m_s=1.0", "run.on_overlap=stop")
+    assert 0 < go(tiny(*slow), tmp_path / "slow").max_overlap < 0.03, "it is not stopped"

@@ -1,6 +1,7 @@
 """Packs made by the real binary."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,49 +10,69 @@ from builders import tiny
 
 from fdnet.dem.deck import specimen_box
 from fdnet.dem.liggghts import Launch
-from fdnet.dem.packing import RestlessError, _creep, check_radii, draw_radii, make_pack
+from fdnet.dem.packing import RestlessError, check_radii, creep_of, draw_radii, make_pack
 from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.run.records import pack_record, record_warnings
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import resting
 
 pytestmark = pytest.mark.liggghts
-DENSE = ("box.size_mm=[5.0,3.0,3.0]", "grains={radius_mm=0.25, porosity=0.36}")
+HERTZ = "contact.model=hertz"
 
 
-def test_porosity_is_met_at_rest_and_the_run_repeats_exactly(binary, tmp_path):
-    case = tiny(*DENSE)
-    packs = [
-        make_pack(case, scales_of(case), tmp_path / name, Launch(binary=binary)) for name in "ab"
-    ]
-    pack = packs[0]
-    assert abs(pack.porosity - 0.36) <= 0.003
+@pytest.fixture(scope="module")
+def packed(binary, tmp_path_factory):
+    """Pack a case in a folder of its own."""
+
+    def made(*keys: str):
+        case, folder = tiny(*keys), tmp_path_factory.mktemp("pack")
+        return make_pack(case, scales_of(case), folder, Launch(binary=binary))
+
+    return made
+
+
+def natural_speed(case) -> float:
+    """One grain diameter per sqrt(m/k), m/s."""
+    mass = 2650 * 4 / 3 * math.pi * 0.25e-3**3
+    stiffness = scales_of(case).contacts["grain-grain"].normal_stiffness
+    return 0.5e-3 * math.sqrt(stiffness / mass)
+
+
+def test_porosity_is_met_at_rest_and_the_run_repeats_exactly(packed):
+    """Linear and Hertz contacts, one radius and a range of them."""
+    box = "box.size_mm=[5.0,3.0,3.0]"
+    dense, uneven = "radius_mm=0.25, porosity=0.36", "radius_mm=[0.15,0.25], porosity=0.40"
+    pack = packed(box, f"grains={{{dense}}}")
     assert pack.porosity_error < 0.001
     assert pack.porosity_sum < pack.porosity
-    assert np.array_equal(pack.grains.position, packs[1].grains.position)
-    per_second = math.sqrt(
-        scales_of(case).contacts["grain-grain"].normal_stiffness
-        / (2650 * 4 / 3 * math.pi * 0.25e-3**3)
-    )
-    assert np.max(np.abs(pack.grains.velocity)) < 1e-6 * 0.5e-3 * per_second
-    assert np.all((pack.grains.position >= 0) & (pack.grains.position <= case.size_m))
+    small = [packed("grains.count=66").grains.position for _ in range(2)]
+    assert np.array_equal(*small)
+    for grains, porosity, made, case in (
+        (dense, 0.36, pack, tiny()),
+        (dense, 0.36, packed(box, HERTZ, f"grains={{{dense}}}"), tiny(HERTZ)),
+        (uneven, 0.40, packed(box, f"grains={{{uneven}}}"), tiny()),
+    ):
+        assert abs(made.porosity - porosity) <= 0.003, grains
+        assert np.all((made.grains.position >= 0) & (made.grains.position <= [5e-3, 3e-3, 3e-3]))
+        if grains == dense:
+            assert np.max(np.abs(made.grains.velocity)) < 1e-6 * natural_speed(case)
+    assert made.grains.radius.min() == pytest.approx(0.15e-3, rel=0.02)
+    assert made.grains.radius.max() == pytest.approx(0.25e-3, rel=0.02)
 
 
 def test_a_pack_that_creeps_is_taken_and_one_that_moves_is_refused(tmp_path):
     """The limit is 1e-5 grain diameters per sqrt(m/k)."""
     case = tiny()
-    scales = scales_of(case)
-    mass = 2650 * 4 / 3 * math.pi * 0.25e-3**3
-    natural = 0.5e-3 * math.sqrt(scales.contacts["grain-grain"].normal_stiffness / mass)
+    scales, natural = scales_of(case), natural_speed(case)
     still = resting(np.random.default_rng(1).random((50, 3)) * 1e-3, 0.25e-3, specimen_box(case))
     direction = np.random.default_rng(2).normal(size=(50, 3))
     direction /= np.sqrt(np.mean(np.sum(direction**2, axis=1)))
-    slow = replace(still, velocity=0.99e-5 * natural * direction)
-    assert _creep(case, scales, tmp_path, slow) == pytest.approx(0.99e-5 * natural)
-    with pytest.raises(
-        LiggghtsError, match="did not come to rest in 80000 steps, its grains still move at"
-    ):
-        _creep(case, scales, tmp_path, replace(still, velocity=1.01e-5 * natural * direction))
+    slow, fast = (
+        replace(still, velocity=share * natural * direction) for share in (0.99e-5, 1.01e-5)
+    )
+    assert creep_of(case, scales, tmp_path, slow) == pytest.approx(0.99e-5 * natural)
+    with pytest.raises(LiggghtsError, match="did not come to rest in 80000 steps"):
+        creep_of(case, scales, tmp_path, fast)
 
 
 def test_radii_that_the_case_does_not_ask_for_are_refused(tmp_path):
@@ -67,69 +88,40 @@ def test_radii_that_the_case_does_not_ask_for_are_refused(tmp_path):
             check_radii(replace(grains, radius=radius), case, tmp_path)
 
 
-def test_a_range_of_radii(binary, tmp_path):
-    case = tiny("box.size_mm=[5.0,3.0,3.0]", "grains={radius_mm=[0.15,0.25], porosity=0.40}")
-    pack = make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
-    assert abs(pack.porosity - 0.40) <= 0.003
-    assert pack.grains.radius.min() == pytest.approx(0.15e-3, rel=0.02)
-    assert pack.grains.radius.max() == pytest.approx(0.25e-3, rel=0.02)
-
-
-def test_count_overrides_porosity(binary, tmp_path):
-    case = tiny("grains={radius_mm=0.25, porosity=0.9, count=66}")
-    pack = make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
+def test_count_overrides_porosity(packed):
+    pack = packed("grains={radius_mm=0.25, porosity=0.9, count=66}")
     assert len(pack.grains) == 66
-    assert pack.porosity_sum == pytest.approx(
-        1 - 66 * 4 / 3 * math.pi * 0.25**3 / (3.0 * 1.6 * 1.6), rel=1e-9
-    )
+    solid = 66 * 4 / 3 * math.pi * 0.25**3 / (3.0 * 1.6 * 1.6)
+    assert pack.porosity_sum == pytest.approx(1 - solid, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("porosity", "message"),
-    [
-        (0.12, "pushed out of it"),
-        (0.27, "0.27 needs .* a porosity of 0.35. at random .*, and about 0.[23]. within"),
-    ],
-)
-def test_unreachable_porosity_is_an_error(binary, tmp_path, porosity, message):
-    case = tiny(f"grains={{radius_mm=0.25, porosity={porosity}, max_overlap=0.08}}")
-    with pytest.raises(CaseError, match=message):
-        make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
-
-
-def test_a_grain_too_coarse_for_the_tolerance_is_an_error(binary, tmp_path):
-    case = tiny("box.size_mm=[1.2,1.2,1.2]", "grains={radius_mm=0.25, porosity=0.47}")
-    with pytest.raises(CaseError, match="one grain is"):
-        make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
-
-
-def test_the_overlap_limit_holds_for_a_count_too(binary, tmp_path):
-    case = tiny("grains={radius_mm=0.25, count=98}")
-    with pytest.raises(
-        CaseError,
-        match=r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs more room",
+def test_what_cannot_be_packed_is_an_error_with_what_can(packed):
+    small = "box.size_mm=[1.2,1.2,1.2]"
+    for keys, message in (
+        (("porosity=0.12, max_overlap=0.08",), "pushed out of it"),
+        (
+            ("porosity=0.27, max_overlap=0.08",),
+            "0.27 needs .* a porosity of 0.35. at random .*, and about 0.[23]. within",
+        ),
+        (("porosity=0.47", small), "one grain is"),
+        (
+            ("count=98",),
+            r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs",
+        ),
     ):
-        make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
+        with pytest.raises(CaseError) as error:
+            packed(f"grains={{radius_mm=0.25, {keys[0]}}}", *keys[1:])
+        assert re.search(message, str(error.value)), keys
 
 
-def short_relaxation(monkeypatch):
-    monkeypatch.setattr("fdnet.dem.packing.REST_RUNS", 1)
-    monkeypatch.setattr("fdnet.dem.packing.RELAX_RUN_STEPS", 10)
-
-
-def test_a_pack_that_never_rests_is_given_up_after_some_places(binary, tmp_path, monkeypatch):
-    short_relaxation(monkeypatch)
-    monkeypatch.setattr("fdnet.dem.packing.PLACES", 2)
-    case = tiny("grains={radius_mm=0.25, count=72}")
-    with pytest.raises(RestlessError, match="tried 2 times from other places"):
-        make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
-
-
-def test_a_pack_that_does_not_rest_is_made_again_from_the_next_places(
-    binary, tmp_path, monkeypatch
+def test_a_pack_that_does_not_rest_is_made_again_from_the_next_places_and_given_up(
+    binary, packed, tmp_path, monkeypatch
 ):
     """The first one is called restless; the second starts from other places, the same radii."""
-    short_relaxation(monkeypatch)
+    for name, value in (("REST_RUNS", 1), ("RELAX_RUN_STEPS", 10), ("PLACES", 2)):
+        monkeypatch.setattr(f"fdnet.dem.packing.{name}", value)
+    with pytest.raises(RestlessError, match="tried 2 times from other places"):
+        packed("grains={radius_mm=0.25, count=72}")
     judged = []
 
     def creep(*_):
@@ -138,21 +130,17 @@ def test_a_pack_that_does_not_rest_is_made_again_from_the_next_places(
             raise RestlessError("the first")
         return 1e-9
 
-    monkeypatch.setattr("fdnet.dem.packing._creep", creep)
+    monkeypatch.setattr("fdnet.dem.packing.creep_of", creep)
     case = tiny("grains={radius_mm=[0.2, 0.25], count=72}")
     pack = make_pack(case, scales_of(case), tmp_path, Launch(binary=binary))
-    assert pack.restless == 1
+    assert (pack.restless, judged) == (1, [0, 1])
     assert [row["restless"] for row in pack.attempts] == [1]
-    assert judged == [0, 1]
     start = np.loadtxt(tmp_path / "pack.data", skiprows=11)
-    drawn = np.random.default_rng([case.seed, 72, 1]).random((72, 3))
-    reach = np.array(case.size_m) * drawn
-    radius = 0.5 * start[:, 2]
+    reach = np.array(case.size_m) * np.random.default_rng([case.seed, 72, 1]).random((72, 3))
+    radius, middle = 0.5 * start[:, 2], 0.5 * np.array(case.size_m)
     assert 0.6 * draw_radii(case, 72) == pytest.approx(radius)
-    middle = 0.5 * np.array(case.size_m)
     inner = np.abs(reach - middle) < 0.5 * middle
-    shift = np.abs(start[:, 4:7] - reach)
-    assert np.all(shift[inner] <= radius.max() + 1e-12)
+    assert np.all(np.abs(start[:, 4:7] - reach)[inner] <= radius.max() + 1e-12)
     record = pack_record(case, pack, tmp_path, assumed=0.4, seconds=1.0)
     warnings = record_warnings(case, record, None)
     assert any("1 packs did not come to rest" in one for one in warnings)

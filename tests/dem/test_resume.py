@@ -1,74 +1,109 @@
-"""A cut invasion that is continued gives the numbers of an uncut one."""
+"""A cut invasion that is continued gives the numbers of an uncut one, wherever it was cut."""
 
+import json
+import os
 import shutil
-from dataclasses import replace
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from importlib import metadata
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import tiny
+from builders import followed, tiny
 from cut_and_continue import MATRIX, StopError, cell_case, differences
 
-from fdnet.dem.checkpoint import Checkpoints
-from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Launch
-from fdnet.dem.packing import make_pack
+from fdnet.dem.checkpoint import (
+    UPDATES,
+    Checkpoints,
+    file_digest,
+    read_history,
+    read_updates,
+)
+from fdnet.dem.invasion import invade, steps_between
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.errors import CaseError, LiggghtsError
+from fdnet.run.fluid import fluid_of
 from fdnet.scales.scales import scales_of
 
 pytestmark = pytest.mark.liggghts
-QUICK = (
-    ("walls", "fixed", "batches", "held"),
-    ("periodic", "fixed", "batches", "held"),
-    ("periodic", "mobile", "batches", "viscous"),
-    ("walls", "fixed", "slab", "implicit"),
-    ("walls", "mobile", "slab", "held"),
-)
-"""Cells of every run of the suite; in the first three a continued one once gave other numbers."""
-
-
-def last_checkpoint(folder, case):
-    return Checkpoints(folder=folder, digest=case.digest("invade")).last()
-
-
-@pytest.fixture(scope="module")
-def packed(binary, tmp_path_factory):
-    """Grains of a case, made on first use for each kind of box."""
-    made = {}
-
-    def grains(case):
-        box = (case.box.sides, case.size_m)
-        if box not in made:
-            folder = tmp_path_factory.mktemp(case.box.sides)
-            made[box] = make_pack(case, scales_of(case), folder, Launch(binary=binary)).grains
-        return made[box]
-
-    return grains
+HERTZ, ROUGH = "contact.model=hertz", "box.wall_friction=0.3"
+QUICK = {
+    ("walls", "fixed", "batches", "held"): (),
+    ("periodic", "fixed", "batches", "held"): (),
+    ("periodic", "mobile", "batches", "viscous"): (),
+    ("walls", "fixed", "slab", "implicit"): (),
+    ("periodic", "fixed", "slab", "viscous"): (HERTZ,),
+    ("walls", "mobile", "batches", "held"): (
+        HERTZ,
+        ROUGH,
+        "contact.restitution=liquid",
+        "contact.rolling_friction=0.2",
+        "contact.cohesion_J_m3=1e6",
+    ),
+}
+"""Cells of every run of the suite, with further keys; in the first three a continued one once gave
+other numbers."""
 
 
 @pytest.mark.parametrize("cell", QUICK, ids="-".join)
-def test_a_continued_invasion_is_the_uncut_one(binary, packed, tmp_path, cell):
-    case = cell_case(*cell)
-    assert differences(case, packed(case), tmp_path, binary) == []
+def test_a_continued_invasion_is_the_uncut_one(binary, grains_of, tmp_path, cell):
+    case = cell_case(*cell, *QUICK[cell])
+    assert differences(case, grains_of(case), tmp_path, binary) == []
     assert not list(tmp_path.glob("*/post/*contacts*")), "the scratch file stays"
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("cell", MATRIX, ids="-".join)
-def test_a_continued_invasion_is_the_uncut_one_everywhere(binary, packed, tmp_path, cell, ranks):
-    case = cell_case(*cell)
-    one = {"ranks": ranks, "everywhere": ranks == 1}
-    assert differences(case, packed(case), tmp_path, binary, **one) == []
+@pytest.mark.parametrize("scheme", ["held", "implicit", "viscous"])
+def test_a_continued_invasion_is_the_uncut_one_everywhere(binary, grains_of, tmp_path, scheme):
+    """All cells, on one rank at each place and on two; both models of contacts where it matters."""
+    for cell, ranks in product([one for one in MATRIX if one[3] == scheme], (1, 2)):
+        case, folder = cell_case(*cell), tmp_path / "-".join([*cell, str(ranks)])
+        one = {"ranks": ranks, "everywhere": ranks == 1}
+        assert differences(case, grains_of(case), folder, binary, **one) == [], (cell, ranks)
 
 
 @pytest.fixture(scope="module")
-def cut(binary, packed, tmp_path_factory):
-    """A small invasion, cut after its last checkpoint: case, grains, folder, and the result."""
-    case = tiny("run.cap_ms=0.3")
-    grains, folder = packed(case), tmp_path_factory.mktemp("cut")
-    whole = invade(case, scales_of(case), grains, folder, Launch(binary=binary))
-    return case, grains, folder, whole
+def go(binary, grains_of):
+    """Invade the pack of a case in a folder, with its fluid."""
+
+    def invaded(case, folder, **launch):
+        scales, grains = scales_of(case), grains_of(case)
+        fluid = fluid_of(case, scales, grains)
+        return invade(case, scales, grains, folder, Launch(binary=binary, **launch), fluid=fluid)
+
+    return invaded
+
+
+SLOWER = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02", "run.cap_ms=0.3")
+CASE = tiny("run.cap_ms=0.3")
+
+
+@pytest.fixture(scope="module")
+def done(go, tmp_path_factory):
+    """A small invasion, finished: folder and result."""
+    folder = tmp_path_factory.mktemp("done")
+    return folder, go(CASE, folder)
+
+
+@pytest.fixture
+def cut(done, tmp_path):
+    """A copy of the folder of that invasion, and the result."""
+    return Path(shutil.copytree(done[0], tmp_path / "cut")), done[1]
+
+
+def points(folder, case=CASE) -> Checkpoints:
+    return Checkpoints(folder=folder, digest=case.digest("invade"))
+
+
+def same(one, other) -> bool:
+    return one.history == other.history and np.array_equal(
+        one.damaged.position, other.damaged.position
+    )
 
 
 def zeros(path: Path) -> None:
@@ -91,91 +126,257 @@ def other_step(path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["restart", "dump", "record"])
-@pytest.mark.parametrize("spoil", [zeros, noise, one_bit, other_step, Path.unlink])
-def test_a_checkpoint_that_is_not_as_recorded_is_passed_over(cut, tmp_path, kind, spoil):
-    case, _, folder, whole = cut
-    shutil.copytree(folder, tmp_path / "cut")
+def test_a_checkpoint_that_is_not_as_recorded_is_passed_over(done, tmp_path, kind):
+    last, before = done[1].history[-1], done[1].history[-2]
+    for spoil in (zeros, noise, one_bit, other_step, Path.unlink):
+        folder = Path(shutil.copytree(done[0], tmp_path / spoil.__name__))
+        assert points(folder).last() == last
+        spoil(folder / "post" / f"invade_{last.step}.{kind}")
+        assert points(folder).last() == before, spoil.__name__
+
+
+def test_dumps_that_lost_rows_and_empty_restarts_are_passed_over(go, cut):
+    folder, whole = cut
     last, before = whole.history[-1], whole.history[-2]
-    assert last_checkpoint(tmp_path / "cut", case) == last
-    spoil(tmp_path / "cut" / "post" / f"invade_{last.step}.{kind}")
-    assert last_checkpoint(tmp_path / "cut", case) == before
+    dump = folder / "post" / f"invade_{last.step}.dump"
+    text = dump.read_bytes().replace(
+        b"ITEM: NUMBER OF ATOMS\n300\n", b"ITEM: NUMBER OF ATOMS\n299\n"
+    )
+    for spoilt in (dump.read_bytes()[:-40], text[: text.rstrip(b"\n").rindex(b"\n") + 1]):
+        dump.write_bytes(spoilt)
+        assert points(folder).last() == before
+    (folder / "post" / f"invade_{before.step}.restart").write_bytes(b"")
+    assert points(folder).last() is None
+    assert same(go(CASE, folder), whole)
 
 
-def test_a_zeroed_restart_is_passed_over_with_a_warning(binary, cut, tmp_path):
-    case, grains, folder, whole = cut
-    shutil.copytree(folder, tmp_path / "cut")
-    zeros(tmp_path / "cut" / "post" / f"invade_{whole.history[-1].step}.restart")
-    launch = Launch(binary=binary, timeout=60.0)
-    again = invade(case, scales_of(case), grains, tmp_path / "cut", launch)
-    assert again.history == whole.history
-    assert np.array_equal(again.damaged.position, whole.damaged.position)
-    new = set(again.warnings) - set(whole.warnings)
-    assert len(new) == 1
-    assert f"went on from the checkpoint at step {whole.history[-2].step}" in new.pop()
+def test_a_restart_cut_by_a_full_disk_is_set_aside(go, cut):
+    folder, whole = cut
+    rows = (folder / "history.csv").read_text().splitlines(keepends=True)
+    (folder / "history.csv").write_text("".join(rows[:-1]))
+    kept = whole.history[-2]
+    restart = folder / "post" / f"invade_{kept.step}.restart"
+    restart.write_bytes(restart.read_bytes()[: int(0.9 * restart.stat().st_size)])
+    record = points(folder).record(kept.step)._replace(restart=file_digest(restart))
+    points(folder).store(kept.step, record)
+    assert points(folder).last() == kept
+    assert same(go(CASE, folder), whole)
 
 
-def test_the_warning_stays_when_the_continuing_session_is_killed_too(binary, cut, tmp_path):
-    case, grains, folder, whole = cut
-    shutil.copytree(folder, tmp_path / "cut")
-    zeros(tmp_path / "cut" / "post" / f"invade_{whole.history[-1].step}.restart")
+def test_a_zeroed_restart_is_passed_over_with_a_warning_that_stays(go, cut):
+    """Also when the continuing session is killed in its turn."""
+    folder, whole = cut
+    zeros(folder / "post" / f"invade_{whole.history[-1].step}.restart")
 
     def stop(line: str) -> None:
         if line.startswith("FDNET checkpoint"):
             raise StopError
 
-    launch = Launch(binary=binary, timeout=60.0)
     with pytest.raises(StopError):
-        invade(case, scales_of(case), grains, tmp_path / "cut", replace(launch, follow=stop))
-    again = invade(case, scales_of(case), grains, tmp_path / "cut", launch)
-    assert again.history == whole.history
-    new = set(again.warnings) - set(whole.warnings)
-    assert [warning for warning in new if "went on from the checkpoint" in warning] == list(new)
-    assert len(new) == 1
+        go(CASE, folder, timeout=60.0, follow=stop)
+    again = go(CASE, folder, timeout=60.0)
+    assert same(again, whole)
+    (new,) = set(again.warnings) - set(whole.warnings)
+    assert "went on from the checkpoint" in new
 
 
-def test_notes_between_the_checkpoints_are_passed_over_and_kept(binary, cut, tmp_path):
-    case, grains, folder, whole = cut
-    shutil.copytree(folder, tmp_path / "cut")
-    post = tmp_path / "cut" / "post"
+def test_notes_between_the_checkpoints_are_passed_over_and_kept(go, cut):
+    folder, whole = cut
     for name in ("invade_notes.txt", "invade_x.dump", "invade_1.dump.bak", "invade_.record"):
-        (post / name).write_text("mine")
-    again = invade(case, scales_of(case), grains, tmp_path / "cut", Launch(binary=binary))
-    assert again.history == whole.history
+        (folder / "post" / name).write_text("mine")
+    again = go(CASE, folder)
+    assert same(again, whole)
     assert again.warnings == whole.warnings
-    assert (post / "invade_notes.txt").read_text() == "mine"
+    assert (folder / "post" / "invade_notes.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize("row", [1, 2])
-def test_a_changed_history_is_refused(binary, cut, tmp_path, row):
-    case, grains, folder, _ = cut
-    for name, lines in {
-        "gone": [],
-        "garbled": ["?,?\n"],
-        "changed": ["1,2,3,4,5,6,7,8\n"],
-    }.items():
-        shutil.copytree(folder, tmp_path / name)
+def test_a_changed_history_is_refused(go, done, tmp_path):
+    for row, (what, lines) in product(
+        (1, 2), {"gone": [], "garbled": ["?,?\n"], "changed": ["1,2,3,4,5,6,7,8\n"]}.items()
+    ):
+        folder = Path(shutil.copytree(done[0], tmp_path / f"{what}{row}"))
         rows = (folder / "history.csv").read_text().splitlines(keepends=True)
         rows[row : row + 1] = lines
-        (tmp_path / name / "history.csv").write_text("".join(rows))
+        (folder / "history.csv").write_text("".join(rows))
         with pytest.raises(LiggghtsError, match=r"history\.csv: .*put the file back"):
-            invade(case, scales_of(case), grains, tmp_path / name, Launch(binary=binary))
+            go(CASE, folder)
 
 
-def test_a_lost_watch_of_the_overlap_starts_the_invasion_over(binary, cut, tmp_path):
-    case, grains, folder, whole = cut
-    shutil.copytree(folder, tmp_path / "cut")
-    (tmp_path / "cut" / "overlap.csv").unlink()
-    again = invade(case, scales_of(case), grains, tmp_path / "cut", Launch(binary=binary))
+def test_history_with_a_half_written_line(tmp_path: Path):
+    (tmp_path / "history.csv").write_text("chunk,step\n1,10,5,5,0,0,5,0\n2,20,4,")
+    assert [row.chunk for row in read_history(tmp_path)] == [1]
+    with pytest.raises(LiggghtsError, match="no checkpoint recorded"):
+        read_history(tmp_path / "none")
+
+
+def test_a_lost_watch_of_the_overlap_starts_the_invasion_over(go, cut):
+    folder, whole = cut
+    (folder / "overlap.csv").unlink()
+    again = go(CASE, folder)
     assert again.overlap == whole.overlap
     assert any("it was started over" in warning for warning in again.warnings)
 
 
-def test_a_checkpoint_of_another_seed_is_not_used(cut):
-    _, _, folder, _ = cut
-    assert last_checkpoint(folder, tiny("run.cap_ms=0.3", "seed=2")) is None
-
-
-def test_another_number_of_ranks_is_refused(binary, cut):
-    case, grains, folder, _ = cut
+def test_another_seed_starts_over_and_other_ranks_are_refused(go, done):
+    folder, _ = done
+    assert points(folder, tiny("run.cap_ms=0.3", "seed=2")).last() is None
     with pytest.raises(CaseError, match=r"begun with --np 1, and --np 2 .* continue with --np 1"):
-        invade(case, scales_of(case), grains, folder, Launch(binary=binary, ranks=2))
+        go(CASE, folder, ranks=2)
+
+
+def test_what_another_version_of_fdnet_began_is_refused(go, cut):
+    """Its forces may be others, and a run of two ways of making them is neither's result."""
+    folder, whole = cut
+    mine = metadata.version("fdnet")
+    for version, said in (("0.0.9", "fdnet 0.0.9"), ("", "fdnet of an earlier version")):
+        for row in whole.history:
+            record = points(folder).record(row.step)
+            assert record is None or record.fdnet in (mine, "0.0.9")
+            if record is not None:
+                points(folder).store(row.step, record._replace(fdnet=version))
+        before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+        with pytest.raises(CaseError, match=f"begun with {said}, and fdnet {mine} .*--force"):
+            go(CASE, folder)
+        after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+        assert after == before
+    for path in (folder / "post").glob("*.record"):
+        data = json.loads(path.read_text())
+        del data["fdnet"]
+        path.write_text(json.dumps(data))
+    with pytest.raises(CaseError, match="of an earlier version"):
+        go(CASE, folder)
+
+
+# ------------------------------------------------------------------------------------------------
+# Invasions whose forces fdnet computes while LIGGGHTS waits.
+
+
+def small(scheme="implicit", *more):
+    """15 grains, fines in batches, 5 checkpoints with five updates each."""
+    return tiny(
+        "drag.crowd=beetstra",
+        f"drag.scheme={scheme}",
+        "drag.update_travel=0.2",
+        "fluid.darcy_length_mm=20.0",
+        "run.time_step_factor=0.2",
+        "box.sides=periodic",
+        "box.size_mm=[1.6,1.0,1.0]",
+        "grains.count=15",
+        "fines.supply=batches",
+        "fines.count=400",
+        "run.cap_ms=0.25",
+        "run.checkpoint_ms=0.05",
+        *more,
+    )
+
+
+@pytest.fixture(scope="module")
+def coupled(go, tmp_path_factory):
+    """A coupled invasion, finished: folder and result."""
+    folder = tmp_path_factory.mktemp("coupled")
+    return folder, go(small(), folder)
+
+
+@pytest.mark.parametrize("scheme", ["implicit", "held"])
+def test_a_continued_coupled_invasion_is_the_uncut_one(binary, grains_of, tmp_path, scheme):
+    case = small(scheme)
+    assert differences(case, grains_of(case), tmp_path, binary) == []
+
+
+@pytest.mark.parametrize("keys", [(), SLOWER])
+def test_a_continued_invasion_in_the_network_s_field_is_the_uncut_one(
+    binary, grains_of, tmp_path, keys
+):
+    """With a slab, and with batches that come as the mud slows down."""
+    case = followed(*keys)
+    assert differences(case, grains_of(case), tmp_path, binary) == []
+
+
+@pytest.mark.nightly
+def test_a_continued_coupled_invasion_is_the_uncut_one_everywhere(binary, grains_of, tmp_path):
+    for scheme, motion, ranks in product(("implicit", "held"), ("fixed", "mobile"), (1, 2)):
+        case, name = small(scheme, f"grains.motion={motion}"), f"{scheme}-{motion}-{ranks}"
+        left = differences(case, grains_of(case), tmp_path / name, binary, ranks=ranks)
+        assert left == [], name
+
+
+def test_every_chunk_begins_with_an_update_and_holds_the_travel(coupled):
+    folder, result = coupled
+    case = small()
+    scales = scales_of(case)
+    steps = steps_between(case, scales, scales.interstitial_velocity)
+    travel = steps * scales.time_step * scales.interstitial_velocity
+    assert 0.9 * 0.2e-4 < travel <= 0.2e-4
+    chunk = scales.checkpoint_steps
+    starts = range(0, len(result.history) * chunk, chunk)
+    expected = [start + at for start in starts for at in range(0, chunk, steps)]
+    assert [row["step"] for row in result.updates] == expected
+    assert read_updates(folder) == list(result.updates)
+
+
+def test_a_changed_record_of_updates_makes_the_checkpoint_unusable(coupled, tmp_path):
+    folder, whole = Path(shutil.copytree(coupled[0], tmp_path / "cut")), coupled[1]
+    assert points(folder, small()).last() == whole.history[-1]
+    lines = (folder / UPDATES).read_text().splitlines()
+    row = lines[-2].split(",")
+    row[lines[0].split(",").index("factor_mean")] = "1.0"
+    lines[-2] = ",".join(row)
+    (folder / UPDATES).write_text("\n".join(lines) + "\n")
+    assert points(folder, small()).last() == whole.history[-2]
+
+
+def test_liggghts_that_is_killed_is_reported_and_the_run_goes_on_bit_for_bit(
+    go, coupled, tmp_path
+):
+    _, whole = coupled
+
+    def kill(line: str) -> None:
+        if line.startswith("FDNET checkpoint 3 "):
+            children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+            for child in children:
+                if b"liggghts" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    os.kill(int(child), signal.SIGKILL)
+
+    with pytest.raises(LiggghtsError, match=r"in\.invade: LIGGGHTS failed \(ended by signal 9"):
+        go(small(), tmp_path, follow=kill)
+    again = go(small(), tmp_path)
+    assert same(again, whole)
+    assert again.updates == whole.updates
+
+
+ORPHAN = """
+import sys
+from pathlib import Path
+from fdnet.dem.liggghts import find_binary
+from fdnet.dem.liggghts import run_deck
+from fdnet.dem.liggghts import Launch
+
+def play(feed):
+    print("started", feed.process.pid, flush=True)
+    feed('shell sleep 0.1', 'print "alive"')
+    sys.stdin.read()
+
+run_deck(Path(sys.argv[1]), "in.none", Launch(binary=find_binary()), play)
+"""
+
+
+def test_liggghts_ends_when_fdnet_is_killed(tmp_path):
+    command = [sys.executable, "-c", textwrap.dedent(ORPHAN), str(tmp_path)]
+    parent = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    child = int(parent.stdout.readline().split()[1])
+    parent.kill()
+    parent.wait()
+    deadline = time.monotonic() + 10
+    while Path(f"/proc/{child}").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not Path(f"/proc/{child}").exists()
+
+
+def test_what_goes_wrong_while_liggghts_waits_is_reported(binary, tmp_path):
+    for command, timeout, message in (
+        ("nonsense 1", None, "ERROR: Unknown command: nonsense"),
+        ("shell sleep 30", 1.0, "did not end within its time limit"),
+    ):
+        launch = Launch(binary=binary, timeout=timeout)
+        with pytest.raises(LiggghtsError, match=message):
+            run_deck(tmp_path, "in.none", launch, lambda feed, one=command: feed(one))

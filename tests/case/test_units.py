@@ -1,11 +1,11 @@
-"""Values with their units, and curves in files, as people write them in a case."""
+"""Values with their units, as people write them in a case."""
 
 import copy
 import tomllib
 from decimal import Decimal
 
 import pytest
-from builders import TINY, tiny
+from builders import TINY, tiny, told
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.file import case_from, known_keys, read_case
@@ -13,9 +13,12 @@ from fdnet.case.units import SUFFIXES, UNITS, converted, share_of, stem_of
 from fdnet.errors import CaseError
 
 
-@pytest.mark.parametrize(
-    ("text", "suffix", "value"),
-    [
+def test_units_convert_as_their_definitions_say():
+    """NIST SP 811: psi 6894.757 Pa, oil barrel 0.1589873 m3, pound 0.45359237 kg, foot 0.3048 m.
+
+    The darcy is 9.869233e-13 m2.
+    """
+    for text, suffix, value in [
         ("80 um", "_mm", 0.08),
         ("80µm", "_mm", 0.08),
         ("500 psi", "_MPa", 3.4473786465841),
@@ -31,25 +34,21 @@ from fdnet.errors import CaseError
         ("1e3 ft/min", "_m_s", 5.08),
         ("60 N/m", "_N_m", 60.0),
         ("5 %", "_percent", 5.0),
-    ],
-)
-def test_units_convert_as_their_definitions_say(text, suffix, value):
-    """NIST SP 811: psi 6894.757 Pa, oil barrel 0.1589873 m3, pound 0.45359237 kg, foot 0.3048 m.
-
-    The darcy is 9.869233e-13 m2.
-    """
-    assert converted(text, suffix) == pytest.approx(value, rel=2e-9)
+    ]:
+        with told(text, suffix, value):
+            assert converted(text, suffix) == pytest.approx(value, rel=2e-9)
 
 
 def test_decimal_conversions_have_no_rounding():
     assert converted("40 um", "_mm") == 0.04
     assert converted("0.25 mm", "_mm") == 0.25
     assert share_of("5 %") == 0.05
+    assert UNITS["length"]["in"] == Decimal("0.0254")
+    assert float(UNITS["permeability"]["D"]) == pytest.approx(9.869233e-13, rel=1e-7)
 
 
-@pytest.mark.parametrize(
-    ("text", "suffix", "message"),
-    [
+def test_an_ambiguous_or_wrong_unit_is_refused():
+    for text, suffix, message in [
         ("10 psi", "_cP", "'psi' is a unit of pressure, expected a number and a unit of visc"),
         ("10", "_cP", "has no unit"),
         ("25 ppb", "_kg_m3", "pounds per barrel or parts per billion"),
@@ -58,11 +57,9 @@ def test_decimal_conversions_have_no_rounding():
         ("1 2 mm", "_mm", "no unit that is known"),
         ("mm", "_mm", "expected a number and a unit of length"),
         ("9" * 70 + " mm", "_mm", "expected a number"),
-    ],
-)
-def test_an_ambiguous_or_wrong_unit_is_refused(text, suffix, message):
-    with pytest.raises(ValueError, match=message):
-        converted(text, suffix)
+    ]:
+        with told(text, suffix, message), pytest.raises(ValueError, match=message):
+            converted(text, suffix)
 
 
 def test_every_key_with_a_unit_takes_a_text_with_its_unit():
@@ -96,6 +93,8 @@ overbalance = "300 psi"
 [run]
 duration = "2 ms"
 """
+
+
 PLAIN = {
     "name": "tiny",
     "box": {"size_mm": [3.0, 1.6, 1.6]},
@@ -143,9 +142,8 @@ def test_a_set_key_replaces_the_same_key_in_another_unit(tmp_path):
     assert "fluid.viscosity" not in case.given
 
 
-@pytest.mark.parametrize(
-    ("part", "values", "expected"),
-    [
+def test_ambiguous_units_in_a_case_are_one_problem():
+    for part, values, expected in [
         ("fluid", {"viscosity": "10 cP", "viscosity_cP": 10.0}, "viscosity: given next to visc"),
         ("fluid", {"viscosity": 10}, "fluid.viscosity: 10 has no unit"),
         ("fluid", {"viscosity": "10 psi"}, "'psi' is a unit of pressure"),
@@ -154,30 +152,30 @@ def test_a_set_key_replaces_the_same_key_in_another_unit(tmp_path):
         ("grains", {"porosity": "40 mm %"}, "no unit that is known"),
         ("fines", {"D50_um": 40}, "did you mean fines.sizes"),
         ("box", {"size": ["3 mm", 4, "4 mm"]}, "has no unit; write it with its unit"),
-    ],
-)
-def test_ambiguous_units_in_a_case_are_one_problem(part, values, expected):
-    data = copy.deepcopy(TINY)
-    if "size" in values:
-        del data[part]["size_mm"]
-    data.setdefault(part, {}).update(values)
-    with pytest.raises(CaseError, match="1 problem:") as caught:
-        case_from(data)
-    assert expected in str(caught.value)
+    ]:
+        with told(part, values, expected):
+            data = copy.deepcopy(TINY)
+            if "size" in values:
+                del data[part]["size_mm"]
+            data.setdefault(part, {}).update(values)
+            with pytest.raises(CaseError, match="1 problem:") as caught:
+                case_from(data)
+            assert expected in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("solids", "density", "fraction"),
-    [("25 lb/bbl", 2710.0, 71.32525436 / 2710), ("40 kg/m3", 2000.0, 0.02)],
-)
-def test_solids_by_mass_are_the_concentration_by_volume(solids, density, fraction):
-    fines = TINY["fines"] | {"solids": solids, "density_kg_m3": density}
-    case = case_from(TINY | {"fines": fines})
-    assert isinstance(case, InvasionCase)
-    assert case.fines.concentration is None
-    assert case.fines.volume_fraction == pytest.approx(fraction, rel=1e-9)
-    assert case_from(tomllib.loads(case.toml())) == case
-    assert tiny().fines.volume_fraction == 0.1
+def test_solids_by_mass_are_the_concentration_by_volume():
+    for solids, density, fraction in [
+        ("25 lb/bbl", 2710.0, 71.32525436 / 2710),
+        ("40 kg/m3", 2000.0, 0.02),
+    ]:
+        with told(solids, density, fraction):
+            fines = TINY["fines"] | {"solids": solids, "density_kg_m3": density}
+            case = case_from(TINY | {"fines": fines})
+            assert isinstance(case, InvasionCase)
+            assert case.fines.concentration is None
+            assert case.fines.volume_fraction == pytest.approx(fraction, rel=1e-9)
+            assert case_from(tomllib.loads(case.toml())) == case
+            assert tiny().fines.volume_fraction == 0.1
 
 
 def test_more_solids_than_fit_are_refused():
@@ -185,8 +183,3 @@ def test_more_solids_than_fit_are_refused():
         case_from(TINY | {"fines": TINY["fines"] | {"solids": "300 lb/bbl"}})
     with pytest.raises(CaseError, match="give exactly one of the two"):
         case_from(TINY | {"fines": TINY["fines"] | {"solids": "3 lb/bbl", "concentration": 0.1}})
-
-
-def test_constants_are_those_of_the_definitions():
-    assert UNITS["length"]["in"] == Decimal("0.0254")
-    assert float(UNITS["permeability"]["D"]) == pytest.approx(9.869233e-13, rel=1e-7)

@@ -1,27 +1,29 @@
-"""Cases: what is accepted, and that every problem is named at once."""
+"""Case files: every problem is named at once, with its value, what is expected and what to do."""
 
 import copy
 import csv
 import datetime
 import hashlib
 import math
+import re
 import tomllib
 from pathlib import Path
 
 import pytest
-from builders import TINY, tiny
+from builders import TINY, tiny, told
 
 from fdnet.case.case import (
     KEYS,
     Case,
     InvasionCase,
+    difference_text,
     with_fines,
 )
 from fdnet.case.file import case_from, known_keys, read_case, set_keys
+from fdnet.cli import main
 from fdnet.errors import CaseError
+from fdnet.run.folder import RunFolder, mark_folder, open_folder
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
-from validation.thesis.runs.carry_out import find_state, state_path
-from validation.thesis.runs.plan import SPECIMENS, VARIANTS, planned
 
 
 def problems(data: dict) -> str:
@@ -61,9 +63,8 @@ def test_every_problem_is_listed_at_once():
     assert "\n" not in text
 
 
-@pytest.mark.parametrize(
-    ("part", "values", "expected"),
-    [
+def test_a_bad_value_is_named_with_its_path():
+    for part, values, expected in [
         ("fines", {"radius_mm": 0.3}, "not below grains.radius_mm 0.25"),
         ("fines", {"slab_mm": 2.0}, "give exactly one of the two"),
         ("fines", {"concentration": 0.4}, "fines.concentration: 0.4"),
@@ -100,26 +101,9 @@ def test_every_problem_is_listed_at_once():
         ("analysis", {"damage_law": "kozeny"}, "'kozeny' is no longer there; take 'section-arc"),
         ("drag", {"scheme": "every_step"}, "'every_step' is no longer there; take 'held'"),
         ("fluid", {"viscosity_Pas": 0.05}, "unknown key"),
-    ],
-)
-def test_a_bad_value_is_named_with_its_path(part, values, expected):
-    assert expected in problems(changed(**{part: values}))
-
-
-@pytest.mark.parametrize(
-    ("part", "values"), [("fines", {"count": True}), ("grains", {"count": 66.0})]
-)
-def test_a_bad_key_brings_no_false_problem_with_it(part, values):
-    text = problems(changed(**{part: values}))
-    assert "1 problem:" in text
-
-
-def test_problems_between_keys_are_listed_one_by_one_next_to_those_of_keys():
-    data = changed(fines={"radius_mm": 0.3}, drag={"field": "network"}, run={"cap_ms": True})
-    text = problems(data)
-    assert "3 problems: run.cap_ms: True" in text
-    assert " | fines.radius_mm: 0.3 is not below grains.radius_mm 0.25" in text
-    assert " | drag.upstream: 'interstitial', but with drag.field" in text
+    ]:
+        with told(part, values, expected):
+            assert expected in problems(changed(**{part: values}))
 
 
 def test_a_bad_key_silences_only_the_rules_that_read_it():
@@ -128,6 +112,13 @@ def test_a_bad_key_silences_only_the_rules_that_read_it():
     assert "grains.radius_mm: -1.0" in text
     assert "not below" not in text
     assert "give exactly one of the two" in text
+    for part, values in (("fines", {"count": True}), ("grains", {"count": 66.0})):
+        assert "1 problem:" in problems(changed(**{part: values})), part
+    data = changed(fines={"radius_mm": 0.3}, drag={"field": "network"}, run={"cap_ms": True})
+    text = problems(data)
+    assert "3 problems: run.cap_ms: True" in text
+    assert " | fines.radius_mm: 0.3 is not below grains.radius_mm 0.25" in text
+    assert " | drag.upstream: 'interstitial', but with drag.field" in text
 
 
 def test_a_case_without_fines_is_a_type_of_its_own():
@@ -157,17 +148,9 @@ def test_every_table_is_written():
     assert list(tiny(*settings).data()) == list(KEYS)
     assert "given" not in tiny(well).data()
     assert {"fines", "fines.radius_mm"} <= set(known_keys())
-
-
-def test_a_date_is_refused_like_any_other_value():
     with pytest.raises(CaseError, match="name"):
         case_from(set_keys({**TINY, "name": datetime.date(2020, 1, 1)}, []))
-
-
-def test_porosity_or_count_is_needed():
-    data = copy.deepcopy(TINY)
-    del data["grains"]["count"]
-    assert "grains.porosity: missing" in problems(data)
+    assert "grains.porosity: missing" in problems({**TINY, "grains": {"radius_mm": 0.25}})
 
 
 def test_toml_comes_back_as_the_same_case():
@@ -177,22 +160,24 @@ def test_toml_comes_back_as_the_same_case():
     assert again.digest() == case.digest()
 
 
-def test_the_neighbour_search_belongs_to_the_invasion():
-    """It changes the order of sums, so another search is another invasion, but the same pack."""
-    for setting in ("run.skin_mm=0.04", "run.neighbour_bin_mm=0.2"):
-        assert tiny(setting).digest("pack") == tiny().digest("pack")
-        assert tiny(setting).digest("invade") != tiny().digest("invade")
-
-
 def test_stages_depend_only_on_their_own_keys():
-    case = tiny()
-    other_law = tiny("analysis.law=thesis")
-    other_fines = tiny("fines.count=301")
-    assert other_law.digest("invade") == case.digest("invade")
-    assert other_law.digest("analyse") != case.digest("analyse")
-    assert other_fines.digest("pack") == case.digest("pack")
-    assert other_fines.digest("invade") != case.digest("invade")
-    assert tiny("seed=2").digest("pack") != case.digest("pack")
+    """The neighbour search changes the order of sums: another invasion of the same pack."""
+    for key, stages in {
+        "analysis.law=thesis": {"analyse"},
+        "fines.count=301": {"invade", "analyse"},
+        "run.skin_mm=0.04": {"invade", "analyse"},
+        "run.neighbour_bin_mm=0.2": {"invade", "analyse"},
+        "seed=2": {"pack", "invade", "analyse"},
+        "run.max_hours=1.0": set(),
+        "run.max_overlap=0.1": set(),
+        "run.on_overlap=stop": set(),
+    }.items():
+        case, other = tiny(), tiny(key)
+        moved = {one for one in DIGESTS if other.digest(one) != case.digest(one)}
+        assert moved == stages, key
+
+
+DIGESTS = ("pack", "invade", "analyse")
 
 
 def test_analysis_choices_reach_the_analysis():
@@ -228,42 +213,15 @@ def test_unreadable_and_malformed_files(tmp_path: Path):
 
 def test_fixed_keys_of_the_contract_exist():
     fixed = {
-        "name",
-        "seed",
-        "box.size_mm",
-        "box.sides",
-        "grains.radius_mm",
-        "grains.porosity",
-        "grains.density_kg_m3",
-        "grains.friction",
-        "grains.motion",
-        "fines.radius_mm",
-        "fines.density_kg_m3",
-        "fines.friction",
-        "fines.concentration",
-        "fluid.viscosity_cP",
-        "fluid.density_kg_m3",
-        "fluid.overbalance_MPa",
-        "drag.field",
-        "drag.multiplier",
-        "analysis.sections",
-        "analysis.law",
-        "analysis.damage_law",
+        "box": "size_mm sides",
+        "grains": "radius_mm porosity density_kg_m3 friction motion",
+        "fines": "radius_mm density_kg_m3 friction concentration",
+        "fluid": "viscosity_cP density_kg_m3 overbalance_MPa",
+        "drag": "field multiplier",
+        "analysis": "sections law damage_law",
     }
-    assert fixed <= set(known_keys())
-
-
-def test_shipped_cases_are_valid_short_and_named_as_their_files(root: Path):
-    full, quick = (
-        {path.stem: path for path in (root / folder).glob("*.toml")}
-        for folder in ("cases", "cases/quick")
-    )
-    own = {"quick", "antler-sand", "growing-cake", "sand-and-mud", "well"}
-    assert set(full) == {*own, *SPECIMENS, *VARIANTS}
-    assert set(quick) == {*SPECIMENS, *VARIANTS}
-    for name, path in [*full.items(), *((f"quick-{name}", path) for name, path in quick.items())]:
-        assert read_case(path).name == name
-        assert len(path.read_text().splitlines()) < 60
+    names = {f"{table}.{key}" for table, keys in fixed.items() for key in keys.split()}
+    assert names | {"name", "seed"} <= set(known_keys())
 
 
 def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
@@ -274,22 +232,16 @@ def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
     shipped -= {path for path in shipped if path.parts[0] == "sweeps"}
     assert shipped == {Path(f"{row['case']}.toml") for row in rows}
     for row in rows:
-        case = read_case(root / "cases" / f"{row['case']}.toml")
+        path = root / "cases" / f"{row['case']}.toml"
+        assert len(path.read_text().splitlines()) < 60
+        case = read_case(path)
+        assert case.name == row["case"].replace("quick/", "quick-")
         text = case.toml()
         assert row == {
             "case": row["case"],
             **{stage: case.digest(stage) for stage in ("pack", "invade", "analyse")},
             "text": hashlib.sha256(text.encode()).hexdigest()[:16],
         }
-
-
-def test_stored_states_still_belong_to_their_cases(root: Path):
-    """`find_state` raises when a state belongs to another case than that of its run."""
-    states = root / "docs/thesis/states"
-    stored = [item for item in planned(quick=False) if state_path(states, item).exists()]
-    assert len(stored) == len(list(states.glob("*-seed*.npz"))) > 20
-    for item in stored:
-        assert find_state(states, item, item.load()) is not None
 
 
 def test_values_in_si_are_those_of_the_keys():
@@ -347,3 +299,217 @@ def test_a_box_for_more_grains_than_memory_is_refused():
         match=r"box\.size_mm: \[800.0, 800.0, 800.0\] holds 4\.69e\+09 grains; expected at",
     ):
         case_from(huge)
+
+
+# ------------------------------------------------------------------------------------------------
+# Sizes, units and amounts at the command line.
+
+
+SAND_AND_MUD = """
+name = "bad"
+[box]
+size = ["3 mm", "2.4 mm", "2.4 mm"]
+[grains]
+sizes = {sand}
+porosity = "38 %"
+[fines]
+sizes = {mud}
+{solids}
+slab = "1 mm"
+{more}
+[well]
+radius = "108 mm"
+drainage_radius = "100 m"
+[run]
+stiffness = "100 N/m"
+"""
+
+
+SAND = '{ D10 = "0.25 mm", D50 = "0.40 mm", D90 = "0.60 mm" }'
+
+
+MUD = '{ D10 = "30 um", D50 = "40 um", D90 = "60 um" }'
+
+
+POINTS = '{{ size = ["20 um", "40 um", "80 um"], passing_percent = {} }}'
+
+
+def written(folder: Path, **changed: str) -> Path:
+    good = {"sand": SAND, "mud": MUD, "solids": 'concentration = "5 %"', "more": ""}
+    path = folder / "bad.toml"
+    path.write_text(SAND_AND_MUD.format(**{**good, **changed}), encoding="utf-8")
+    return path
+
+
+def test_bad_input_is_one_clear_error(tmp_path, capsys):
+    assert main(["check", str(written(tmp_path))]) == 0, "the case itself is good"
+    for number, (changed, message) in enumerate(
+        [
+            ({"mud": POINTS.format("[50.0, 20.0, 100.0]")}, "the curve must not fall: 50 % pass"),
+            ({"mud": POINTS.format("[0.0, 50.0, 90.0]")}, "the curve ends at 90 % at 0.08 mm"),
+            ({"mud": '{ D10 = "60 um", D50 = "40 um" }'}, "must rise from D10 to D90"),
+            ({"mud": '{ D10 = "20 um", D50 = "40 cP" }'}, "'cP' is a unit of viscosity"),
+            ({"mud": '{ D10 = "20 um", D50_mm = 0.04, D50 = "40 um" }'}, "give one of the two"),
+            ({"sand": SAND.replace("0.25 mm", "0.25")}, "'0.25': has no unit"),
+            ({"mud": '{ D10 = "420 um", D50 = "430 um", D90 = "440 um" }'}, "above every throat"),
+            ({"mud": '{ D10 = "50 um", D50 = "150 um", D90 = "300 um" }'}, "is not below"),
+            (
+                {
+                    "sand": '{ D50 = "0.40 mm", D90 = "0.402 mm" }',
+                    "mud": '{ D50 = "0.20 mm", D90 = "0.21 mm" }',
+                },
+                "above every throat between touching grains",
+            ),
+            ({"solids": 'concentration = "45 %"'}, "fines.concentration: 0.45"),
+            ({"solids": 'solids = "400 lb/bbl"'}, "expected at most"),
+            ({"solids": 'solids = "25 ppb"'}, "pounds per barrel or parts per billion"),
+            (
+                {"solids": 'concentration = "5 %"\nsolids = "25 lb/bbl"'},
+                "give exactly one of the two",
+            ),
+        ]
+    ):
+        folder_ = tmp_path / str(number)
+        folder_.mkdir()
+        with told(changed, message):
+            path = written(folder_, **changed)
+            assert main(["check", str(path)]) == 2
+            error = capsys.readouterr().err
+            assert message in error
+            assert "1 problem:" in error
+            assert len(error.splitlines()) == 1
+
+
+def test_an_unknown_key_is_met_with_the_one_that_is_meant():
+    for key, hint in [
+        ("fines.D50_um", "did you mean fines.sizes ="),
+        ("fines.radius_um", "did you mean fines.radius_mm?"),
+        ("fluid.viscosity_Pa_s", "did you mean fluid.viscosity_cP?"),
+        ("fines.porosity", "did you mean grains.porosity?"),
+        ("grains.frictoin", "did you mean grains.friction?"),
+        ("fines.spread", "unknown key (given 1)"),
+    ]:
+        with told(key, hint):
+            with pytest.raises(CaseError) as caught:
+                case_from(set_keys(tiny().data(), [f"{key}=1"]))
+            assert hint in str(caught.value)
+            assert "slab_mm?" not in str(caught.value)
+
+
+def test_a_run_of_another_case_is_refused_with_the_keys_that_differ(tmp_path, capsys):
+    case, run = tmp_path / "case.toml", tmp_path / "run"
+    case.write_text(tiny().toml())
+    run.mkdir()
+    mark_folder(run)
+    (run / "case.toml").write_text(tiny("fines.count=200", "run.max_hours=1.0").toml())
+    assert main(["run", str(case), "--out", str(run), "--resume"]) == 2
+    error = capsys.readouterr().err
+    assert "fines.count = 200 there, 300 here" in error
+    assert "repeat the --set" in error
+    assert "max_hours" not in error
+
+
+def test_what_differs_between_two_cases_is_named_by_key():
+    mine = tiny("grains.friction=0.3", "run.on_overlap=stop")
+    assert difference_text(mine, tiny().data()) == "grains.friction = 0.55 there, 0.3 here"
+    assert difference_text(tiny(), tiny().data()) == ""
+    many = tiny(*(f"fluid.{key}=2.0" for key in ("viscosity_cP", "density_kg_m3")), "seed=9",
+                "fines.count=7", "grains.count=50", "analysis.sections=2")  # fmt: skip
+    assert difference_text(many, tiny().data()).endswith(", and 2 more keys")
+
+
+def test_every_command_explains_itself(capsys):
+    def screen(*words: str) -> str:
+        with pytest.raises(SystemExit) as ended:
+            main([*words, "--help"])
+        assert ended.value.code == 0
+        return capsys.readouterr().out
+
+    commands = re.findall(r"(?m)^    ([a-z]+)(?: |$)", screen())
+    assert {"run", "check", "permeability", "movie"} <= set(commands)
+    for command in commands:
+        shown = screen(command)
+        assert f"fdnet {command}" in shown
+        assert "%%" not in shown
+
+
+# ------------------------------------------------------------------------------------------------
+# Side walls of the analysis count in the digest of a stage whose fluid is made with them.
+
+
+NETWORK = ("drag.field=network", "drag.upstream=darcy", "drag.scheme=implicit")
+
+
+LIFTED = ("clean_up.drawdown_MPa=1.0",)
+
+
+RECORD = {
+    "format": 1,
+    "ranks": 1,
+    "files": {"post/gone.dump": "0" * 64},
+    "seconds": 1.0,
+    "max_overlap": 0.0,
+    "steps": 1,
+    "dt_s": 1e-7,
+    "runs": [{"version": "3.8.0", "seconds": 1.0}],
+    "left_out": [],
+    "porosity": 0.4,
+    "porosity_assumed": 0.4,
+    "attempts": [{"liggghts_s": 1.0}],
+    "stop_reason": "cap",
+    "physical_time_s": 1.0,
+    "supplied": 1,
+    "warnings": [],
+}
+"""A record of any stage, but for its digest."""
+
+
+PERIODIC = ("box.sides=periodic",)
+
+
+def moved_by(*keys: str) -> set[str]:
+    """The stages whose digest is another one where the walls slip."""
+    held, slip = tiny(*keys), tiny(*keys, "analysis.walls=slip")
+    return {
+        stage
+        for stage in ("pack", "invade", "clean_up", "analyse")
+        if held.digest(stage) != slip.digest(stage)
+    }
+
+
+def test_walls_count_where_the_fluid_is_made_with_them():
+    """The analysis itself always depends on them; a pack never does."""
+    for keys, stages in [
+        (NETWORK, {"invade", "clean_up"}),
+        ((*NETWORK, *LIFTED, "run.stiffness_N_m=auto"), {"invade", "clean_up"}),
+        (LIFTED, set()),
+        ((), set()),
+        ((*NETWORK, *PERIODIC), set()),
+    ]:
+        with told(keys, stages):
+            assert moved_by(*keys) == {*stages, "analyse"}
+
+
+def with_stages(case: Case, path, *stages: str) -> RunFolder:
+    """A run folder in which `stages` are done, by their records."""
+    folder = open_folder(path, case, stages=stages, resume=False, force=False)
+    for stage in stages:
+        (path / stage).mkdir()
+        folder.finish(stage, RECORD | {"digest": case.digest(stage)})
+    folder.complete(None)
+    folder.close()
+    return folder
+
+
+def test_force_keeps_no_invasion_made_with_other_walls(tmp_path):
+    for number, keys in enumerate([NETWORK, (*NETWORK, *LIFTED)]):
+        folder_ = tmp_path / str(number)
+        folder_.mkdir()
+        with told(keys):
+            case, path = tiny(*keys), folder_ / "run"
+            with_stages(case, path, "pack", "invade")
+            later = tuple(stage for stage in case.stages if stage not in ("pack", "invade"))
+            slip = tiny(*keys, "analysis.walls=slip")
+            with pytest.raises(CaseError, match="invade: belongs to another case; add invade"):
+                open_folder(path, slip, stages=later, resume=False, force=True)
+            open_folder(path, case, stages=later, resume=False, force=True).close()

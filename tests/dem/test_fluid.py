@@ -1,0 +1,763 @@
+"""The fluid that answers for its fines: crowds, and the flow of the network after its deposit."""
+
+import itertools
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import TINY, followed, resting_spheres, tiny
+from scipy.integrate import quad
+
+from fdnet.case.file import case_from
+from fdnet.dem.deck import snapshot_of, specimen_box, write_data
+from fdnet.dem.invade_deck import (
+    FluidForces,
+    Moment,
+    drag_rate,
+    fine_density,
+    largest_share,
+    read_state,
+    render_invade,
+    write_forces,
+    write_parts,
+)
+from fdnet.dem.invasion import invade, steps_between
+from fdnet.dem.liggghts import Launch, find_binary, run_deck
+from fdnet.dem.supply import batches_of, densities
+from fdnet.errors import CaseError, LiggghtsError
+from fdnet.network.field.field import velocity_field
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.laws.named import LAWS
+from fdnet.network.network import build_network
+from fdnet.run.fluid import Movers, NetworkFluid, fluid_of, history_rows, mean_ahead
+from fdnet.run.network_flow import (
+    MOVED,
+    Renewal,
+    bed_section,
+    changed_share,
+    on_each_fine,
+    placed,
+    pore_through,
+)
+from fdnet.scales.scales import scales_of
+from fdnet.scales.table import scale_rows
+from fdnet.spheres.dump import read_frame
+from fdnet.spheres.snapshot import Kind, Snapshot
+from tests.network.packs import random_pack
+
+pytestmark = pytest.mark.liggghts
+LAUNCH = Launch(binary=find_binary())
+FINE = "fines.radius_mm=0.0125"
+FIRST = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
+
+
+@pytest.fixture(scope="module")
+def fluid(grains_of) -> NetworkFluid:
+    case = followed()
+    return fluid_of(case, scales_of(case), grains_of(case))
+
+
+@pytest.fixture(scope="module")
+def go(binary):
+    """Invade with a fluid in a folder."""
+
+    def invaded(fluid, folder, driving=None):
+        launch = Launch(binary=binary)
+        fluid_ = driving or fluid
+        return invade(fluid.case, fluid.scales, fluid.grains, folder, launch, fluid=fluid_)
+
+    return invaded
+
+
+@pytest.fixture(scope="module")
+def done(go, fluid, tmp_path_factory):
+    return go(fluid, tmp_path_factory.mktemp("done"))
+
+
+def fines(position, radius, box, velocity=(0.0, 0.0, 0.0)) -> Snapshot:
+    made = resting_spheres(position, radius, box, kind=Kind.FINE, first=10_000)
+    return replace(made, velocity=np.tile(velocity, (len(made), 1)))
+
+
+def with_case(fluid, *more, scales=None, **way):
+    """The same pack in a case with other settings; the pack is not solved again.
+
+    The `scales` are those of that case unless they are given.
+    """
+    case = followed(*more, **way)
+    other = replace(fluid, case=case, scales=scales or scales_of(case))
+    other.__dict__["pack"] = fluid.pack
+    return other
+
+
+def deposit_of(done) -> Snapshot:
+    return replace(done.damaged.fines(), velocity=np.zeros((len(done.damaged.fines()), 3)))
+
+
+def test_the_way_of_each_fine_follows_its_own_density(fluid):
+    """Light and heavy fines go as in muds of their own kind."""
+    velocity = (3.0 * fluid.first_velocity, fluid.first_velocity, 0.0)
+    place = np.random.default_rng(1).random((40, 3)) * 1e-3
+    moving = fluid.grains.joined(fines(place, 1e-5, fluid.grains.box, velocity))
+    density = np.repeat([500.0, 8000.0], 20)
+    mixed = way_of(fluid.forces(moving, replace(FIRST, density=density)))
+    light, heavy = (
+        way_of(with_case(fluid, key, scales=fluid.scales).forces(moving, FIRST))
+        for key in ("fines.density_kg_m3=500.0", "fines.density_kg_m3=8000.0")
+    )
+    assert mixed == pytest.approx(np.concatenate([light[:20], heavy[20:]]), rel=1e-9, abs=1e-9)
+    assert not np.allclose(light, heavy, rtol=0.1)
+
+
+def way_of(forces) -> np.ndarray:
+    """The fluid on the way of each fine, over the superficial velocity."""
+    return forces.velocity / forces.measures["velocity_m_s"]
+
+
+def test_batches_come_as_the_mud_that_slows_down_carries_them(go, fluid, tmp_path):
+    """The mud has moved by the filtrate over the face; a batch enters before it is needed."""
+    keys = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02", "run.cap_ms=0.3")
+    other = with_case(fluid, *keys)
+    result = go(other, tmp_path)
+    batches, area = batches_of(other.case, other.scales), fluid.pack.network.area
+    table = history_rows(other.case, other.scales, result.history, result.updates)
+    entered = [batches.entered_with(line["supplied_count"]) for line in table]
+    counted = [row.upstream + row.invaded + row.passed for row in result.history]
+    assert [line["supplied_count"] for line in table] == counted
+    assert result.supplied == counted[-1]
+    undisturbed = [batches.entered_at(row.chunk + 1) for row in result.history]
+    assert all(late <= one for late, one in zip(entered, undisturbed, strict=True))
+    assert 4 < entered[-1] < undisturbed[-1]
+    for row, count in zip(result.history, entered, strict=True):
+        filtrate = [line["filtrate_m3"] for line in result.updates if line["step"] < row.step][-1]
+        assert count >= batches.entered_after(filtrate / area)
+
+
+def carried_with(fluid, deposit):
+    return Renewal(fluid.pack).of(deposit, anew=True)
+
+
+def test_an_intact_pack_carries_all_and_its_grains_take_up_the_pressure_drop(fluid):
+    none = fines(np.empty((0, 3)), 5e-5, fluid.grains.box)
+    carried, _ = carried_with(fluid, none)
+    assert carried.k_over_k0 == pytest.approx(1.0, rel=1e-9)
+    assert carried.ratio == pytest.approx(1.0, rel=1e-9)
+    assert carried.pressed.grains[0] == pytest.approx(fluid.pack.network.area, rel=1e-9)
+    assert np.all(carried.pressed.groups == 0.0)
+
+
+def test_pores_carry_what_enters_them(fluid):
+    """The mean share over the layers of pores: each plane across the flow carries all of it."""
+    pack, network = fluid.pack, fluid.pack.network
+    through = pore_through(network, pack.flow)
+    assert np.all(through >= 0)
+    assert through.max() < 1.0 + 1e-9
+    first, second = network.throat_pores.T
+    x = network.pore_position[:, 0]
+    for plane in (0.4e-3, 0.8e-3, 1.2e-3):
+        crossing = (x[first] - plane) * (x[second] - plane) < 0
+        sign = np.sign(x[second] - x[first])
+        flux = (pack.flow.throat_flux * sign)[crossing].sum()
+        assert flux == pytest.approx(pack.flow.inflow, rel=1e-6)
+
+
+def test_pores_at_walls_carry_half_of_all_that_crosses_their_throats():
+    """As much comes in as goes out, also where a throat has one half or one quarter in the box."""
+    pack = random_pack(60, 0.5, periodic=False)
+    network = build_network(pack, periodic=(False,) * 3, walls="no-slip")
+    flow = solve_flow(network, LAWS["lubrication"](network))
+    pair = network.pore_group[network.throat_pores]
+    passed = np.where(pair[:, 0] == pair[:, 1], 0.0, 0.5 * np.abs(flow.throat_flux))
+    half = sum(np.bincount(pair[:, end], passed, len(network.pore_group)) for end in (0, 1))
+    at_wall = np.zeros(len(network.pore_group), bool)
+    at_wall[pair[network.throat_share < 1.0]] = True
+    some = at_wall[network.pore_group] & (np.abs(flow.pore_pressure - 0.5) < 0.49)
+    assert np.count_nonzero(some) > 50
+    through = half[network.pore_group] / flow.inflow
+    assert pore_through(network, flow)[some] == pytest.approx(through[some], rel=1e-6)
+
+
+def test_the_rate_follows_the_resistances_in_series(fluid, done):
+    """Closed form for pack, cake and the rest of the way, in what the fluid itself measures."""
+    standing = fluid.grains.joined(deposit_of(done))
+    intact = fluid.case.fluid.viscosity_Pa_s * fluid.pack.length / fluid.pack.permeability
+    for other, rest in ((fluid, 0.0), (with_case(fluid, way="fluid.darcy_length_mm=4.8"), 2.0)):
+        row = other.forces(standing, FIRST).measures
+        assert other.rest == pytest.approx(rest, abs=1e-9)
+        cake = row["pressure_cake_Pa"] / row["velocity_m_s"] / intact
+        share = (1 + rest) / (1 / row["k_over_k0"] + cake + rest)
+        assert row["velocity_m_s"] == pytest.approx(share * other.first_velocity, rel=1e-9)
+        assert row["k_over_k0"] < 0.95
+    steady = with_case(fluid, "drag.drive=rate")
+    row = steady.forces(standing, FIRST).measures
+    assert row["velocity_m_s"] == steady.first_velocity
+    carried = carried_with(fluid, deposit_of(done))[0]
+    assert carried.ratio.min() < 0.8, "the deposit turns the flow aside"
+    assert carried.ratio.max() > 1.05
+
+
+def test_a_standing_cake_takes_the_pressure_of_carman_and_kozeny(fluid):
+    """Sixteen layers of a cubic bed upstream, 0.1 mm apart, at rest."""
+    spacing, radius = 1e-4, 4.9e-5
+    axis = np.arange(spacing / 2, 1e-3, spacing)
+    x = -2e-3 + spacing * np.arange(-8, 8)
+    place = np.stack(np.meshgrid(x, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+    bed = fluid.grains.joined(fines(place, radius, fluid.grains.box))
+    row = fluid.forces(bed, FIRST).measures
+    solid = 4 / 3 * np.pi * (radius / spacing) ** 3
+    gradient = 180 * fluid.case.fluid.viscosity_Pa_s * solid**2 * row["velocity_m_s"]
+    gradient /= (1 - solid) ** 3 * (2 * radius) ** 2
+    assert row["pressure_cake_Pa"] == pytest.approx(gradient * 16 * spacing, rel=0.15)
+    assert row["cake_thickness_m"] == pytest.approx(16 * spacing, rel=0.1)
+
+
+def test_fines_that_move_with_the_mud_make_no_cake_and_feel_no_force(fluid):
+    place = np.random.default_rng(1).random((200, 3)) * 1e-3 - np.array([3e-3, 0, 0])
+    speed = fluid.first_velocity
+    moving = fines(place, 5e-5, fluid.grains.box, velocity=(speed, 0.0, 0.0))
+    forces = fluid.forces(fluid.grains.joined(moving), FIRST)
+    assert forces.measures["pressure_cake_Pa"] == 0.0
+    assert forces.measures["rate_over_initial"] == pytest.approx(1.0, rel=1e-9)
+    assert forces.velocity[:, 0] == pytest.approx(speed, rel=1e-6)
+    assert np.abs(forces.push).max() == 0.0
+
+
+def test_forces_on_fines_and_grains_add_up_to_the_drop_of_pressure(fluid, done):
+    standing = deposit_of(done)
+    forces = fluid.forces(fluid.grains.joined(standing), FIRST)
+    depth = standing.position[:, 0]
+    inside = (depth >= 0) & (depth < fluid.pack.length)
+    on_fines = forces.coefficient * forces.velocity[:, 0]
+    carried, deposit = carried_with(fluid, standing)
+    drop = forces.measures["pressure_pack_Pa"]
+    caked = on_each_fine(carried.pressed, deposit)[deposit.fines.position[:, 0] < 0, 0]
+    total = on_fines[inside].sum() + drop * (caked.sum() + carried.pressed.grains[0])
+    assert float(total) == pytest.approx(drop * fluid.pack.network.area, rel=0.01)
+    assert forces.measures["momentum_defect"] <= 0.01
+    assert 0.5 < forces.measures["crowd_over_network"] < 2.0
+
+
+def test_the_balance_holds_while_fines_move_at_another_pace_than_the_fluid(fluid):
+    """Many fines in the pack that are slower or faster than it: exact, for drag is linear."""
+    viscosity, pack = fluid.case.fluid.viscosity_Pa_s, fluid.pack
+    whole = pack.length * fluid.first_velocity * viscosity / pack.permeability
+    place = np.random.default_rng(2).random((150, 3)) * np.array([1.5e-3, 1e-3, 1e-3])
+    before = {"velocity_m_s": 0.6 * fluid.first_velocity, "time_s": 0.0}
+    moment = replace(FIRST, before=before | {"rate_m3_s": 0.0, "filtrate_m3": 0.0})
+    for pace in (0.0, 2.0):
+        speed = pace * fluid.first_velocity / fluid.scales.porosity
+        moving = fines(place, 2e-5, fluid.grains.box, velocity=(speed, 0.0, 0.0))
+        row = replace(fluid, standing=0.0).forces(fluid.grains.joined(moving), moment).measures
+        assert row["fines_standing"] == 0
+        assert row["momentum_defect"] < 1e-9, pace
+        assert row["pressure_pack_Pa"] == pytest.approx(whole, rel=1e-6), pace
+        assert (row["rate_over_initial"] < 1.0) == (pace < 1.0)
+
+
+def test_each_pore_gives_all_its_force_to_the_fines_in_it(fluid, done):
+    """So the fines of any part of the pack take up what the network loses to them there."""
+    carried, deposit = carried_with(fluid, deposit_of(done))
+    each = on_each_fine(carried.pressed, deposit)
+    group = fluid.pack.network.pore_group[deposit.pore]
+    held = carried.pressed.groups[np.unique(group)]
+    assert each.sum(axis=0) == pytest.approx(held.sum(axis=0), rel=1e-9)
+    assert each[:, 0].sum() == pytest.approx(carried.pressed.groups[:, 0].sum(), rel=5e-3)
+    some = np.unique(group)[:10]
+    share = np.isin(group, some)
+    pore, fine, volume = (one[share] for one in (deposit.pore, deposit.fine, deposit.volume))
+    part = replace(deposit, pore=pore, fine=fine, volume=volume)
+    alone = on_each_fine(carried.pressed, part)
+    assert alone.sum(axis=0) == pytest.approx(carried.pressed.groups[some].sum(axis=0), rel=1e-9)
+
+
+def test_a_bed_is_pressed_on_the_harmonic_mean_of_its_section(fluid):
+    network, section = fluid.pack.network, bed_section(fluid.pack.network)
+    open_ones = np.flatnonzero((network.throat_area > 0) & (network.throat_heights[:, 0] > 0))
+    for throat in open_ones[:5]:
+        height, narrow = network.throat_heights[throat, 0], network.throat_area[throat]
+        way = quad(lambda z, s=narrow: 1.0 / (s + np.pi * z**2 / 2), 0.0, height)[0]
+        assert section[throat, 0] == pytest.approx(height / way, rel=1e-6)
+
+
+def test_the_fines_take_the_share_of_the_pressure_that_resolved_flow_gives_them(fluid, done):
+    """Stokes flow around grains and fines, to a factor of 2: its forces know no network.
+
+    The deposit of 15 grains differs from processor to processor, and the factor from 1.4 to 1.6.
+    """
+    standing = deposit_of(done)
+    depth = standing.position[:, 0]
+    inside = standing.where((depth > 5e-5) & (depth < fluid.pack.length))
+    pressed = carried_with(fluid, inside)[0].pressed
+    network = pressed.groups[:, 0].sum() / (pressed.groups[:, 0].sum() + pressed.grains[0])
+    field = velocity_field(fluid.grains, periodic="yz", fines=inside, cells=16)
+    resolved = field.fine_force[:, 0].sum()
+    resolved /= resolved + field.grain_force[:, 0].sum()
+    assert 0.5 < network / resolved < 2.0
+
+
+def test_what_fines_close_still_carries_the_pressure(fluid):
+    """A wall of fines across the whole pack: nothing flows, and they feel the whole drop."""
+    axis = np.arange(2.5e-5, 1e-3, 5e-5)
+    layers = np.arange(0.6e-3, 0.9e-3, 5e-5)
+    place = np.stack(np.meshgrid(layers, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+    carried, _ = carried_with(fluid, fines(place, 4e-5, fluid.grains.box))
+    assert 0.0 < carried.k_over_k0 < 1e-3
+    total = carried.pressed.grains + carried.pressed.groups.sum(axis=0)
+    assert total[0] == pytest.approx(fluid.pack.network.area, rel=1e-6)
+    assert carried.pressed.groups[:, 0].sum() > 0.1 * fluid.pack.network.area
+
+
+def test_the_network_is_solved_anew_when_the_deposit_changed(fluid, done):
+    standing = deposit_of(done)
+    renewal = Renewal(fluid.pack)
+    first = renewal.of(standing, anew=False)[0]
+    assert renewal.of(standing, anew=False)[0] is first
+    inner = np.flatnonzero((standing.position[:, 0] > 0) & (standing.position[:, 0] < 1e-3))
+    place = np.array(standing.position)
+    place[inner[0], 2] += 0.9 * standing.radius[0]
+    moved = replace(standing, position=place)
+    assert renewal.of(moved, anew=False)[0] is first
+    assert renewal.deposit.renewed == 1
+    keep = np.ones(len(standing), bool)
+    keep[inner[: len(inner) // 2]] = False
+    assert changed_share(renewal.solved, standing.where(keep)) > 0.1
+    less = renewal.of(standing.where(keep), anew=False)[0]
+    assert less.k_over_k0 > first.k_over_k0
+    assert renewal.of(standing.where(keep), anew=True)[0] is not less
+    assert renewal.solves == 3
+
+
+def test_a_fine_is_measured_within_a_hundredth_of_its_radius(fluid, done):
+    standing = deposit_of(done)
+    near = placed(standing)
+    apart = np.linalg.norm(near.position - standing.position, axis=1) / standing.radius
+    assert 0.0 < np.median(apart) < apart.max() <= MOVED
+    assert np.array_equal(placed(near).position, near.position)
+    tremble = 1e-5 * standing.radius[:, None] * np.array([1.0, -1.0, 1.0])
+    again = placed(replace(standing, position=standing.position + tremble))
+    assert np.mean(np.any(again.position != near.position, axis=1)) < 0.01
+
+
+def test_updates_from_the_former_one_give_what_a_full_one_gives(fluid, done):
+    standing = deposit_of(done)
+    place = np.array(standing.position)
+    place[::7] += 3e-5
+    after = fluid.grains.joined(replace(standing, position=place))
+    fluid.forces(fluid.grains.joined(standing), FIRST)
+    grown = fluid.forces(after, FIRST)
+    assert 0 < fluid.renewal.deposit.renewed < len(standing) / 2
+    full = replace(fluid).forces(after, FIRST)
+    for name in ("coefficient", "velocity", "push"):
+        assert np.array_equal(getattr(grown, name), getattr(full, name))
+    assert grown.measures == full.measures
+
+
+def test_what_changed_counts_by_volume():
+    box = np.array([[0.0, 1.0]] * 3)
+    four = fines(np.array([[0.1 * k, 0.5, 0.5] for k in range(4)]), 0.01, box)
+    assert changed_share(four, four) == 0.0
+    three = four.where(np.arange(4) < 3)
+    assert changed_share(four, three) == pytest.approx(0.25)
+    assert changed_share(three, four) == pytest.approx(0.25)
+    shift = replace(four, position=four.position + np.array([[0.011, 0, 0]] + 3 * [[0.0] * 3]))
+    assert changed_share(four, shift) == pytest.approx(0.25)
+    nothing = four.where(np.zeros(4, bool))
+    assert changed_share(nothing, nothing) == 0.0
+
+
+def test_the_ledger_adds_up_and_momentum_closes(fluid, done):
+    rows = done.updates
+    passed = [
+        one["rate_m3_s"] * (two["time_s"] - one["time_s"]) for one, two in itertools.pairwise(rows)
+    ]
+    assert rows[-1]["filtrate_m3"] == pytest.approx(sum(passed), rel=1e-9)
+    assert rows[0]["rate_over_initial"] == pytest.approx(1.0, rel=0.02)
+    assert rows[-1]["rate_over_initial"] < 0.95
+    area, whole = fluid.pack.network.area, rows[0]
+    total = whole["pressure_pack_Pa"] + whole["pressure_cake_Pa"]
+    for row in rows:
+        assert row["pressure_pack_Pa"] + row["pressure_cake_Pa"] == pytest.approx(total, rel=1e-6)
+        assert row["rate_m3_s"] == pytest.approx(row["velocity_m_s"] * area, rel=1e-12)
+        assert row["momentum_defect"] <= 0.01
+    table = history_rows(fluid.case, fluid.scales, done.history, rows)
+    assert [line["step"] for line in table] == [row.step for row in done.history]
+    assert table[-1]["filtrate_m3"] == rows[-1]["filtrate_m3"]
+    assert len(set(fluid.measured)) == len(fluid.measured), "no two columns have one name"
+
+
+def test_a_rate_or_a_volume_that_is_asked_for_ends_the_run(go, fluid, done, tmp_path):
+    pores = fluid.scales.porosity * np.prod(fluid.case.size_m)
+    share = done.updates[len(done.updates) // 2]["rate_over_initial"]
+    asked = float(0.5 * done.updates[-1]["filtrate_m3"] / pores)
+    results = {}
+    for reason, key in (
+        ("plugged", f"run.stop_rate={share}"),
+        ("duration", f"run.stop_pore_volumes={asked!r}"),
+    ):
+        result = results[reason] = go(with_case(fluid, key), tmp_path / reason)
+        assert result.stop_reason == reason
+        assert 0 < len(result.history) < len(done.history)
+        assert result.updates == done.updates[: len(result.updates)]
+    rows, history = results["duration"].updates, results["duration"].history
+    before = [row for row in rows if row["step"] < history[-2].step]
+    assert before[-1]["filtrate_m3"] < asked * pores <= rows[-1]["filtrate_m3"]
+
+
+def test_a_slab_at_constant_rate_raises_the_pressure(go, fluid, tmp_path):
+    """The mud comes on as at the start, the filtrate is rate times time, the pressure grows."""
+    other = with_case(fluid, "drag.drive=rate", "run.cap_ms=0.3")
+    result = go(other, tmp_path)
+    assert other.case.fines.supply == "slab"
+    assert result.stop_reason == "cap"
+    first, last = result.updates[0], result.updates[-1]
+    assert last["velocity_m_s"] == first["velocity_m_s"] == other.first_velocity
+    assert last["filtrate_m3"] == pytest.approx(first["rate_m3_s"] * last["time_s"], rel=1e-9)
+    assert last["k_over_k0"] < 0.95
+    network = first["pressure_pack_Pa"] / last["k_over_k0"]
+    assert last["pressure_pack_Pa"] == pytest.approx(network, rel=0.05)
+    assert max(row["momentum_defect"] for row in result.updates) <= 0.01
+
+
+def test_the_stiffness_that_a_deposit_needs_is_named_and_holds(go, fluid, tmp_path):
+    """Springs: F = 6 dp pi D^2 / 4 with D^2 = 32 k / phi, and dp = mu U L / k by Darcy."""
+    case, scales = fluid.case, fluid.scales
+    pressure = case.fluid.viscosity_Pa_s * scales.darcy_velocity * 1.6e-3 / scales.permeability
+    force = 6 * pressure * np.pi / 4 * 32 * scales.permeability / scales.porosity
+    stiffness = scales.contacts["grain-fine"].normal_stiffness
+    assert scales.deposit_overlap == pytest.approx(force / stiffness / 1e-4, rel=1e-9)
+    text = " ".join(scales.warnings) + " "
+    asked = re.search(r"hold the whole pressure.*set run\.stiffness_N_m = (\S+?)[,;]? ", text)
+    firm = with_case(fluid, f"run.stiffness_N_m={float(asked[1])}", "run.cap_ms=0.3")
+    assert firm.scales.deposit_overlap <= case.run.max_overlap
+    assert not [text for text in firm.scales.warnings if "whole pressure" in text]
+    assert "overlap in the deposit" in " ".join(row.name for row in scale_rows(case, scales))
+    assert 0.0 < go(firm, tmp_path).max_overlap < 0.05
+    with pytest.raises(CaseError, match="deposit alone would press"):
+        scales_of(followed("run.stiffness_N_m=50", "run.max_overlap=0.4"))
+
+
+def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
+    for keys, warned in (((), False), (("drag.field=uniform",), True)):
+        texts = [text for text in scales_of(followed(*keys)).warnings if "throats" in text]
+        assert bool(texts) is warned
+
+
+def test_what_does_not_go_with_the_network_is_refused():
+    """Key and value are named."""
+    uniform = "drag.field=uniform"
+    for keys, message in (
+        (["drag.upstream=interstitial"], "drag.upstream: 'interstitial', but with drag.field"),
+        (["grains.motion=mobile"], "grains.motion: 'mobile' with drag.field 'network'"),
+        ([uniform, "drag.drive=rate"], "drag.drive: 'rate' belongs to"),
+        (["drag.drive=rate", "run.stop_rate=0.1"], "run.stop_rate: 0.1 needs a rate that"),
+        ([uniform, "run.stop_pore_volumes=2"], "run.stop_pore_volumes: 2 needs drag.field"),
+        (["drag.crowd=none", "drag.inertia=schiller-naumann"], "drag.inertia: 'schiller-nau"),
+        (["drag.scheme=viscous"], "drag.scheme: 'viscous' has one damping for all fines"),
+    ):
+        with pytest.raises(CaseError) as error:
+            followed(*keys)
+        assert message in str(error.value), keys
+    with pytest.raises(CaseError, match="needs a fluid that fdnet computes"):
+        invade(followed(), scales_of(followed()), None, Path("/nowhere"), None)
+
+
+def test_a_fine_stands_when_it_is_slower_than_half_of_what_it_was_given(fluid):
+    """One that left a fast throat is slow for its place, but as fast as its forces make it."""
+    points = np.random.default_rng(4).random((500, 3)) * np.array([1.6e-3, 1e-3, 1e-3])
+    place = points[np.linalg.norm(fluid.pack.shape.at(points), axis=1) > 0.5][:3]
+    speed = 1e-3 * fluid.first_velocity
+    slow = fluid.grains.joined(fines(place, 2e-5, fluid.grains.box, (speed, 0.0, 0.0)))
+    given = np.array([1.5 * speed, 4.0 * speed, 0.0])
+    assert fluid.forces(slow, FIRST).measures["fines_standing"] == 3
+    known = fluid.forces(slow, replace(FIRST, given=given))
+    assert known.measures["fines_standing"] == 2  # the last was given nothing yet
+
+
+class Watched:
+    """A fluid whose answers are compared with what LIGGGHTS shows at the next update."""
+
+    def __init__(self, fluid):
+        self.fluid, self.measured, self.answer, self.compared = fluid, fluid.measured, {}, 0
+
+    def forces(self, spheres, moment):
+        known = [self.answer.get(one, 0.0) for one in spheres.fines().id]
+        assert moment.given == pytest.approx(known, rel=1e-9)
+        self.compared += np.count_nonzero(known)
+        made = self.fluid.forces(spheres, moment)
+        went = np.linalg.norm(made.velocity + made.push / made.coefficient[:, None], axis=1)
+        self.answer = dict(zip(spheres.fines().id, went, strict=True))
+        return made
+
+
+def test_liggghts_shows_the_velocity_that_each_fine_was_given(go, fluid, tmp_path):
+    keys = ("fines.supply=batches", "fines.count=600", "run.cap_ms=0.15")
+    for scheme in ("implicit", "held"):
+        other = with_case(fluid, f"drag.scheme={scheme}", *keys)
+        watched = Watched(other)
+        go(other, tmp_path / scheme, watched)
+        assert watched.compared > 1000
+
+
+# ------------------------------------------------------------------------------------------------
+# Lone fines in a crowd, by the deck.
+
+
+def small(scheme="held", *more):
+    """15 grains and fines in batches, whose drag is that of a crowd."""
+    keys = ("drag.crowd=beetstra", f"drag.scheme={scheme}", "fluid.darcy_length_mm=20.0")
+    keys += ("run.time_step_factor=0.2", "box.sides=periodic", "box.size_mm=[1.6,1.0,1.0]")
+    keys += ("grains.count=15", "fines.supply=batches", "fines.count=400")
+    return tiny(*keys, "run.cap_ms=0.25", "run.checkpoint_ms=0.05", *more)
+
+
+def test_explicit_drag_that_would_overshoot_is_refused(go, grains_of, tmp_path):
+    """Judged by the lighter one of two equal fines: C t / m, m = 4/3 pi r^3 rho."""
+    case = small("held", "drag.multiplier=40.0", "run.stiffness_N_m=100.0")
+    fluid = fluid_of(case, scales_of(case), grains_of(case))
+    with pytest.raises(LiggghtsError, match=r"explicit drag would overshoot; take drag\.scheme"):
+        invade(case, scales_of(case), grains_of(case), tmp_path, LAUNCH, fluid=fluid)
+    two = fines([[0.0, 0.0, 0.0], [1e-3, 0.0, 0.0]], 5e-5, specimen_box(tiny()))
+    forces = given_forces(np.full(2, 2e-6), np.zeros((2, 3)))
+    share = largest_share(two, forces, np.array([2000.0, 500.0]), 1e-5)
+    assert share == pytest.approx(2e-6 * 1e-5 / (4 / 3 * np.pi * 5e-5**3 * 500.0))
+
+
+def given_forces(coefficient, velocity) -> FluidForces:
+    push = np.zeros_like(velocity)
+    return FluidForces(
+        coefficient=coefficient, velocity=velocity, push=push, pace=1.0, measures={}
+    )
+
+
+def test_the_fluid_is_asked_with_the_density_of_each_fine(grains_of, tmp_path):
+    materials = [
+        {
+            "name": name,
+            "share": density,
+            "density_kg_m3": density,
+            "sizes": {"D10_mm": 0.09, "D90_mm": 0.11},
+        }
+        for name, density in (("light", 1100.0), ("heavy", 2200.0))
+    ]
+    supply = {"count": 400, "supply": "batches", "materials": materials}
+    case, seen = case_from(small().data() | {"fines": supply}), []
+    scales, grains = scales_of(case), grains_of(small())
+    fluid = fluid_of(case, scales, grains)
+
+    class Asked:
+        measured = fluid.measured
+
+        def forces(self, spheres, moment):
+            seen.append((spheres.fines(), moment.density))
+            return fluid.forces(spheres, moment)
+
+    invade(case, scales, grains, tmp_path, LAUNCH, fluid=Asked())
+    everyone = densities(case, batches_of(case, scales).counts)
+    assert len(seen) > 5
+    for present, density in seen:
+        assert np.array_equal(density, everyone[present.id.astype(int) - 1 - int(grains.id.max())])
+        assert set(density) == {1100.0, 2200.0}
+
+
+def share_within(bed: Snapshot, low: float, high: float) -> np.ndarray:
+    """Share (N,) of each sphere's volume between two planes across x."""
+    height = [
+        np.clip((bed.position[:, 0] - plane) / bed.radius, -1.0, 1.0) for plane in (low, high)
+    ]
+    beyond = [0.5 + 0.75 * (h - h**3 / 3) for h in height]
+    return beyond[0] - beyond[1]
+
+
+def test_a_standing_bed_of_fines_takes_up_its_pressure_drop(grains_of, tmp_path):
+    """Forces of the fluid in a dump of LIGGGHTS against Carman and Kozeny's gradient, 1 %.
+
+    A random dense bed of 1,028 spheres stands in the box as fines.
+    """
+    data = {key: value for key, value in TINY.items() if key != "fines"} | {
+        "seed": 2,
+        "box": {"size_mm": [9.0, 3.5, 3.5], "sides": "periodic"},
+        "grains": {"radius_mm": 0.25, "porosity": 0.39},
+    }
+    bed = grains_of(case_from(data))
+    case = tiny(
+        "drag.crowd=beetstra",
+        "drag.refresh_steps=1",
+        "box={size_mm=[9.0,3.5,3.5], sides='periodic'}",
+        "fines={radius_mm=0.25, count=1}",
+        "grains={radius_mm=0.3, count=1}",
+        "fluid={velocity_m_s=0.1, viscosity_cP=1.0}",
+    )
+    still = resting_spheres(bed.position, 2.5e-4, bed.box, kind=Kind.FINE, first=2)
+    total = applied_force(case, still, tmp_path)
+    low, high = 1.5e-3, 7.5e-3
+    share = share_within(still, low, high)
+    volume = float(share @ (4 / 3 * np.pi * still.radius**3))
+    area, length = 3.5e-3**2, high - low
+    solid = volume / (area * length)
+    gradient = 180 * 1e-3 * solid**2 * 0.1 / ((1 - solid) ** 3 * (2 * 2.5e-4) ** 2)
+    assert float(share @ total) == pytest.approx(gradient * length * area, rel=0.01)
+
+
+def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(tmp_path):
+    """No number of the first forces is left after the second ones, where zeros have no rows."""
+    case = tiny("drag.crowd=beetstra", "drag.scheme=implicit")
+    box, place = specimen_box(case), [[2e-4, 5e-4, 5e-4], [6e-4, 5e-4, 5e-4]]
+    two = resting_spheres(place, 5e-5, box, kind=Kind.FINE, first=2)
+    write_scene(case, two, tmp_path, density=[2650.0, 2650.0, 1100.5])
+    given = np.array([[[1.0, 2.0, -3.0], [4.0, 5.0, 6.0]], [[7.0, 0.0, 0.0], [0.0, -8.0, 0.0]]])
+
+    def play(feed):
+        feed("include in.invade", "include ask.in")
+        assert np.array_equal(fine_density(read_state(tmp_path, case)), [2650.0, 1100.5])
+        for number, velocity in enumerate(given):
+            write_forces(tmp_path, two, given_forces(np.ones(2), velocity))
+            show = f"write_dump fines custom post/{number}.dump id f_uf[1] f_uf[2] f_uf[3]"
+            feed("include fluid.in", f"{show} modify sort id")
+
+    run_deck(tmp_path, "in.invade", LAUNCH, play)
+    for number, velocity in enumerate(given):
+        frame = read_frame(tmp_path / "post" / f"{number}.dump")
+        shown = np.column_stack([frame.column(f"f_uf[{axis}]") for axis in (1, 2, 3)])
+        assert np.array_equal(shown, velocity)
+
+
+def write_scene(case, fines, folder, *, density) -> Snapshot:
+    """Write the deck of `fines` that a coupled invasion begins with; returns its one grain.
+
+    `density` kg/m3 is that of the grain and of each fine.
+    """
+    scales = scales_of(case)
+    grain = Snapshot.from_arrays([[-1e-3, 1e-3, 1e-3]], 3e-4, box=fines.box)
+    beyond = np.array([[-2e-3, 1e-3], [0.0, 0.0], [0.0, 0.0]])
+    write_data(
+        folder / "invade.data",
+        grain.joined(fines),
+        bounds=fines.box + beyond,
+        density=np.array(density),
+        types=3,
+    )
+    (folder / "in.invade").write_text(render_invade(case, scales, grain).text)
+    (folder / "post").mkdir()
+    write_parts(case, scales, grain, folder)
+    return grain
+
+
+def applied_force(case, fines, folder) -> np.ndarray:
+    """Force (N,) N along x that LIGGGHTS puts on standing fines beside that of their contacts."""
+    scales = scales_of(case)
+    grain = write_scene(case, fines, folder, density=[2650.0] * (len(fines) + 1))
+
+    def play(feed):
+        show = 'write_dump fines custom post/{}.dump id fx modify sort id format "%d %.17g"'
+        feed("include in.invade", "velocity fines set 0.0 0.0 0.0")
+        feed("run 0", show.format("without"), "include ask.in")
+        shown = snapshot_of(read_state(folder, case), case, time_s=0.0)
+        assert np.array_equal(shown.id, fines.id)
+        write_forces(folder, shown, fluid_of(case, scales, grain).forces(shown, FIRST))
+        feed("include fluid.in", "run 0", show.format("with"))
+
+    run_deck(folder, "in.invade", LAUNCH, play)
+    first, second = (read_frame(folder / "post" / f"{name}.dump") for name in ("without", "with"))
+    return second.column("fx") - first.column("fx")
+
+
+# ------------------------------------------------------------------------------------------------
+# What fines meet on the way until the next update.
+
+
+TRACER, FINE = 1e9, "fines.radius_mm=0.0125"
+
+
+def movers(place, rate, velocity=(0.0, 0.0, 0.0)) -> Movers:
+    return Movers(position=np.array([place]), velocity=np.array([velocity]), rate=np.array([rate]))
+
+
+def test_drag_takes_up_the_slip_exactly():
+    """v = u + (v0 - u) exp(-a t), and its integral."""
+    fluid = np.array([[2.0, -1.0, 0.0]])
+    one = movers((1.0, 0.0, 0.0), 3.0, (0.0, 0.0, 5.0)).after(0.4, fluid)
+    left = np.exp(-1.2)
+    assert one.velocity[0] == pytest.approx([2 - 2 * left, -1 + left, 5 * left])
+    share = (1 - left) / 3.0
+    assert one.position[0] == pytest.approx([1.8 - 2 * share, -0.4 + share, 5 * share])
+
+
+def test_the_mean_over_the_way_in_a_flow_that_speeds_up():
+    """A tracer in u = a x goes to x exp(a T). The fluid where it begins is 1.7 times as slow."""
+    a, time, start = 5.0, 0.2, 0.3
+    mean = mean_ahead(movers((start, 0.0, 0.0), TRACER), lambda at: a * at, time)
+    assert mean[0, 0] == pytest.approx(start * (np.exp(a * time) - 1) / time, rel=0.02)
+    assert mean[0, 1:] == pytest.approx(0.0)
+    slow = mean_ahead(movers((0.3, 0.0, 0.0), 1e-9), lambda at: a * at, time)
+    assert slow[0] == pytest.approx([1.5, 0.0, 0.0]), "one that drag hardly moves stays"
+
+
+def test_a_way_that_leads_into_a_grain_ends_before_it():
+    """The grain begins at x = 1; the fluid before it has the velocity 1 at 0 and 2 at 1."""
+
+    def fluid(at):
+        assert np.all(np.isfinite(at))
+        return np.where(at[:, :1] < 1.0, (1.0 + at[:, :1]) * np.array([1.0, 0.0, 0.0]), 0.0)
+
+    near = mean_ahead(movers((0.0, 0.0, 0.0), TRACER), fluid, 100.0)
+    assert 1.0 <= near[0, 0] < 2.0
+    assert mean_ahead(movers((1.5, 0.0, 0.0), TRACER), fluid, 1.0)[0] == pytest.approx(0.0)
+
+
+def test_a_fine_that_stays_where_the_fluid_is_even_meets_it_there():
+    """Before x = 0 the velocity is 1, from there on 1 + x: only fines that get there are asked."""
+    asked = []
+
+    def fluid(at):
+        asked.append(len(at))
+        return (1.0 + np.maximum(at[:, :1], 0.0)) * np.array([1.0, 0.0, 0.0])
+
+    place = np.array([[-5.0, 0.0, 0.0], [-0.5, 0.0, 0.0], [-2.5, 0.0, 0.0], [0.5, 0.0, 0.0]])
+    four = Movers(
+        position=place,
+        velocity=np.array([[1.0, 0.0, 0.0]] * 2 + [[3.0, 0.0, 0.0], [1.0, 0.0, 0.0]]),
+        rate=np.array([TRACER, TRACER, 1e-9, TRACER]),
+    )
+    everywhere = mean_ahead(four, fluid, 1.0)
+    asked.clear()
+    assert np.array_equal(mean_ahead(four, fluid, 1.0, even_to=0.0), everywhere)
+    assert asked == [4] + [3] * 7
+    assert everywhere[0, 0] == 1.0
+    assert np.all(everywhere[1:, 0] > 1.0)
+
+
+def test_updates_at_every_diameter_carry_fines_as_far_as_eight_times_as_many(grains_of):
+    """Fines of 1/20 of a grain cross a pack; the fluid at their place alone holds them back."""
+    case = followed(FINE)
+    scales, grains = scales_of(case), grains_of(case)
+    fluid = NetworkFluid(case=case, scales=scales, grains=grains, standing=0.0)
+    assert gone(fluid, 1.0) == pytest.approx(gone(fluid, 0.125), rel=0.05)
+
+
+def gone(fluid: NetworkFluid, travel: float) -> float:
+    """Mean way of fines through a pack with updates at each `travel` diameters."""
+    case = followed(FINE, f"drag.update_travel={travel}")
+    other = replace(fluid, case=case)
+    other.__dict__["pack"] = fluid.pack
+    place = np.random.default_rng(3).random((400, 3)) * np.array([0.0, 1e-3, 1e-3])
+    start = Snapshot.from_arrays(place, 1.25e-5, box=fluid.grains.box, kind=Kind.FINE)
+    now = replace(start, velocity=np.tile((fluid.first_velocity, 0.0, 0.0), (400, 1)))
+    time, end = 0.0, 4e-4 / fluid.first_velocity
+    moment = replace(FIRST, fresh=False)
+    while time < end:
+        forces = other.forces(fluid.grains.joined(now), moment)
+        rate = drag_rate(now, forces.coefficient, case.fines.density_kg_m3)
+        met = forces.velocity + forces.push / forces.coefficient[:, None]
+        left = steps_between(case, fluid.scales, forces.pace) * fluid.scales.time_step
+        movers = Movers(position=now.position, velocity=now.velocity, rate=rate)
+        after = movers.after(min(left, end - time), met)
+        free = np.any(fluid.pack.shape.at(after.position) != 0.0, axis=1)[:, None]
+        now = replace(
+            now,
+            position=np.where(free, after.position, now.position),
+            velocity=np.where(free, after.velocity, 0.0),
+        )
+        time += left
+    return float(now.position[:, 0].mean())

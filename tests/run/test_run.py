@@ -1,0 +1,506 @@
+"""Whole runs by command line and real binary: output contract, killing, resuming, refusals."""
+
+import contextlib
+import errno
+import fcntl
+import hashlib
+import io
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from builders import tiny, told
+
+from fdnet.cli import main
+from fdnet.errors import CaseError
+from fdnet.run.pipeline import RunOptions, run_stages
+
+pytestmark = pytest.mark.liggghts
+
+
+MORE_HOURS = "run.max_hours=99"
+
+
+TOO_DENSE = "grains.count=110"
+"""Refused only after packing, when the folder holds something already."""
+
+NUMBERS = ("--stages", "pack,invade,analyse")
+"""The stages that make the numbers."""
+
+
+def fdnet(*arguments: str | Path, **options) -> subprocess.CompletedProcess[str]:
+    """One command: in this process, which saves the imports, unless `options` name another."""
+    words = [*map(str, arguments)]
+    if options:
+        command = [sys.executable, "-m", "fdnet.cli", *words]
+        return subprocess.run(command, capture_output=True, text=True, check=False, **options)
+    out, err, handler = io.StringIO(), io.StringIO(), signal.getsignal(signal.SIGTERM)
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = main(words)
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        finally:
+            signal.signal(signal.SIGTERM, handler)
+    return subprocess.CompletedProcess(words, code, out.getvalue(), err.getvalue())
+
+
+def write_case(folder: Path, *assignments: str) -> Path:
+    path = folder / "case.toml"
+    path.write_text(tiny("run.cap_ms=0.35", *assignments).toml())
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(finished):
+    """The finished run of the tiny case: its folder, its case file and what it says."""
+    return finished.path, finished.path / "case.toml", finished.summary
+
+
+@pytest.fixture
+def copy(whole, tmp_path) -> Path:
+    return Path(shutil.copytree(whole[0], tmp_path / "run"))
+
+
+def cut(folder: Path, *stages: str) -> Path:
+    """The folder as a session left it that was killed before these `stages` were done."""
+    (folder / "manifest.json").unlink()
+    for stage in stages:
+        (folder / stage / "stage.json").unlink()
+    return folder
+
+
+def test_the_outside_checker_says_that_the_contract_holds(whole, root):
+    checker = root.parent / "shared" / "checks" / "contract.py"
+    if not checker.exists():
+        pytest.skip(f"the contract checker is not on this machine: {checker}")
+    checked = subprocess.run(
+        [sys.executable, str(checker), str(whole[0])],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert checked.stdout.strip() == "contract holds", checked.stdout
+
+
+def test_the_folder_keeps_the_output_contract(whole):
+    run, _, summary = whole
+    assert summary["supplied_count"] == 300
+    assert summary["invaded_count"] > 0
+    assert 0 < summary["k_damaged_m2"] < summary["k_initial_m2"]
+    manifest = json.loads((run / "manifest.json").read_text())
+    names = ["report.html", "network.vtp"]
+    for stage, deck in (("pack", "in.pack"), ("invade", "in.invade")):
+        digest = hashlib.sha256((run / stage / deck).read_bytes()).hexdigest()
+        assert manifest[stage]["runs"][0]["deck_sha256"] == {deck: digest}
+        names += [f"{stage}/{deck}", f"{stage}/log.liggghts"]
+    assert {"pack", "invade", "analyse", "report"} <= set(summary["seconds"])
+    cpu, memory = summary["cpu_seconds"], summary["peak_memory_bytes"]
+    assert 0 < cpu["liggghts"] <= 1.1 * summary["seconds"]["liggghts"]
+    assert cpu["python"] > 0
+    assert 1e7 < memory["liggghts"] < memory["python"] < 1e10
+    assert all((run / name).stat().st_size > 0 for name in names)
+
+
+def test_a_finished_run_is_not_repeated(whole, root):
+    """By the command, with --resume, and by the script; a policy leaves its case as it is."""
+    run, case, summary = whole
+    before = [(run / name).read_bytes() for name in ("manifest.json", "case.toml")]
+    stamp = (run / "manifest.json").stat().st_mtime_ns
+    for extra in ([], ["--resume"], ["--set", MORE_HOURS]):
+        again = fdnet("run", case, "--out", run, "--json", *extra)
+        assert again.returncode == 0, again.stderr
+        assert json.loads(again.stdout) == summary
+    assert (
+        fdnet("run", case, "--out", run, "--set", MORE_HOURS, "--stages", "pack").returncode == 0
+    )
+    script = [sys.executable, root / "scripts" / "run_case.py", case, "--out", run, "--json"]
+    done = subprocess.run(script, capture_output=True, text=True, check=False)
+    assert json.loads(done.stdout) == summary
+    assert before == [(run / name).read_bytes() for name in ("manifest.json", "case.toml")]
+    assert (run / "manifest.json").stat().st_mtime_ns == stamp
+
+
+def test_stages_still_to_run_take_the_new_policy(whole, tmp_path):
+    _, case, _ = whole
+    out = tmp_path / "run"
+    policy, text = ("--set", MORE_HOURS), []
+    for words in (["pack"], ["pack", *policy], ["invade", *policy]):
+        done = fdnet("run", case, "--out", out, "--stages", *words)
+        assert done.returncode == 0, done.stderr
+        text.append((out / "case.toml").read_text())
+    assert text[0] == text[1]
+    assert "max_hours = 99" in text[2]
+
+
+def test_its_spheres_feed_the_permeability_command(whole):
+    run, _, summary = whole
+    box = ("--box", "0,0.003,0,0.0016,0,0.0016", "--periodic", "yz", "--sections", "3")
+    answer = fdnet("permeability", run / "spheres_damaged.csv", "--axis", "x", *box, "--json")
+    assert answer.returncode == 0, answer.stderr
+    result = json.loads(answer.stdout)
+    for name in ("k_initial_m2", "k_damaged_m2"):
+        assert result[name] == pytest.approx(summary[name], rel=1e-9, abs=0)
+    assert result["porosity_damaged"] == pytest.approx(summary["porosity_damaged"], abs=1e-9)
+
+
+def test_another_case_is_refused(whole, tmp_path):
+    refused = fdnet("run", write_case(tmp_path, "fines.count=200"), "--out", whole[0])
+    assert refused.returncode == 2
+    assert "holds a run of another case" in refused.stderr
+
+
+def test_force_with_another_law_keeps_pack_and_invasion(whole, copy):
+    run, case, summary = whole
+    law = ("--set", "analysis.law=thesis", "--stages", "analyse", "--force", "--json")
+    again = fdnet("run", case, "--out", copy, *law)
+    assert again.returncode == 0, again.stderr
+    result = json.loads(again.stdout)
+    assert result["law"] == "thesis"
+    assert result["invaded_count"] == summary["invaded_count"]
+    assert result["k_initial_m2"] != summary["k_initial_m2"]
+    record = "invade/stage.json"
+    assert (copy / record).stat().st_mtime_ns == (run / record).stat().st_mtime_ns
+
+
+def test_force_that_would_need_an_unasked_stage_changes_nothing(whole, copy):
+    run, case, _ = whole
+    for words, code, said in (
+        (["--set", "fines.friction=0.3", "--stages", "analyse,report"], 2, "add invade to --st"),
+        (["--liggghts", "/nowhere"], 3, "LIGGGHTS not found"),
+    ):
+        refused = fdnet("run", case, "--out", copy, "--force", *words)
+        assert refused.returncode == code
+        assert said in refused.stderr
+    assert sorted(p.name for p in copy.iterdir()) == sorted(p.name for p in run.iterdir())
+    assert fdnet("run", case, "--out", copy).returncode == 0
+
+
+def test_damaged_records_are_named_and_force_mends_them(whole, tmp_path):
+    run, case, _ = whole
+    for name in ("pack/stage.json", "manifest.json", "case.toml"):
+        folder = Path(shutil.copytree(run, tmp_path / name.replace("/", "-")))
+        if name != "manifest.json":
+            cut(folder)
+        for content in (b"{}", b"\xff\xfe", b"[]", b"{"):
+            with told(name, content):
+                (folder / name).write_bytes(content)
+                refused = fdnet("run", case, "--out", folder, "--resume", *NUMBERS)
+                assert refused.returncode == 2, refused.stderr
+                assert "--force" in refused.stderr
+                assert len(refused.stderr.strip().splitlines()) == 1
+        mended = fdnet("run", case, "--out", folder, "--force", "--stages", "pack")
+        assert mended.returncode == 0, mended.stderr
+
+
+def test_a_complete_folder_that_lost_a_table_is_refused(whole, copy):
+    (copy / "sections.csv").unlink()
+    refused = fdnet("run", whole[1], "--out", copy)
+    assert refused.returncode == 2
+    assert "sections.csv is missing" in refused.stderr
+
+
+def test_files_of_a_cut_run_that_are_broken_are_counted_or_refused(whole, copy):
+    """A dump in mid-history is counted, a history that counts what is not there is refused."""
+    _, case, summary = whole
+    command = ["run", case, "--out", cut(copy, "invade"), "--resume", "--json", *NUMBERS]
+    history = copy / "invade" / "history.csv"
+    rows = history.read_text().splitlines()
+    parts = rows[2].split(",")
+    wrong = [*rows[:2], ",".join([*parts[:2], "25", "9999", *parts[4:]]), *rows[3:]]
+    history.write_text("\n".join(wrong) + "\n")
+    refused = fdnet(*command)
+    assert refused.returncode == 3
+    assert "9999" in refused.stderr
+    history.write_text("\n".join(rows) + "\n")
+    dump = copy / "invade" / "post" / f"invade_{rows[1].split(',')[1]}.dump"
+    dump.write_bytes(b"")
+    done = fdnet(*command)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
+    assert any("1 of" in warning and "cannot be read" in warning for warning in result["warnings"])
+    packed = cut(copy) / "pack" / "post" / "pack.dump"
+    packed.write_bytes(packed.read_bytes()[:-50])
+    failed = fdnet(*command)
+    assert failed.returncode == 3
+    assert "pack.dump" in failed.stderr
+    assert "rows, then the file ends" in failed.stderr
+
+
+def test_a_failing_or_hanging_binary_ends_with_3_and_keeps_what_was_written(whole, tmp_path):
+    """The time limit holds for packing too; --resume goes on with a sound one."""
+    _, case, _ = whole
+    fake, out = tmp_path / "liggghts", tmp_path / "run"
+    for end, said in (
+        ('[ "$1" = -h ] || sleep 100', "time limit"),
+        ('echo "ERROR: played"\nexit 1', "ERROR: played"),
+    ):
+        fake.write_text(f'#!/bin/sh\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\n{end}\n')
+        fake.chmod(0o755)
+        start = time.monotonic()
+        words = ["--liggghts", fake, "--timeout", "1", "--resume"]
+        failed = fdnet("run", case, "--out", out, *words)
+        assert failed.returncode == 3
+        assert said in failed.stderr
+        assert "Traceback" not in failed.stderr
+        assert time.monotonic() - start < 30
+    mended = fdnet("run", case, "--out", out, "--resume", *NUMBERS)
+    assert mended.returncode == 0, mended.stderr
+
+
+def test_an_overlap_past_its_limit_stops_the_run_when_asked_and_is_reported(whole, tmp_path):
+    """Tiny's fines overlap by some 5 %: exit 3, state kept; --resume with a policy ends it."""
+    _, case, summary = whole
+    out = tmp_path / "run"
+    lines = [
+        warning
+        for warning in summary["warnings"]
+        if "run.max_overlap" in warning and "at step" in warning
+    ]
+    assert len(lines) == 1
+    command = ["run", case, "--out", out, "--stages", "pack,invade,analyse", "--json"]
+    for extra in ([], ["--resume"]):
+        stopped = fdnet(*command, "--set", "run.on_overlap=stop", *extra)
+        assert stopped.returncode == 3
+        assert "--resume --set run.on_overlap=warn" in stopped.stderr
+    done = fdnet(
+        *command, "--resume", "--set", "run.max_overlap=0.2", "--set", "run.on_overlap=stop"
+    )
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["max_overlap_fraction"] == summary["max_overlap_fraction"] > 0.03
+    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
+    assert not any("run.max_overlap" in warning for warning in result["warnings"])
+
+
+def test_stages_one_after_the_other_equal_all_at_once(whole, tmp_path):
+    run, case, summary = whole
+    for stage in ("pack", "invade", "analyse"):
+        done = fdnet("run", case, "--out", tmp_path / "run", "--stages", stage)
+        assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
+    texts = [Path(p, "spheres_damaged.csv").read_text() for p in (run, tmp_path / "run")]
+    assert texts[0] == texts[1]
+
+
+def test_a_stage_without_its_forerunner_is_refused(tmp_path):
+    case = write_case(tmp_path)
+    for stage, message in (("invade", "no finished pack"), ("analyse", "no finished pack")):
+        refused = fdnet("run", case, "--out", tmp_path / stage, "--stages", stage)
+        assert refused.returncode == 2
+        assert message in refused.stderr
+    refused = fdnet("run", case, "--out", tmp_path / "x", "--stages", "bake")
+    assert refused.returncode == 2
+    assert not (tmp_path / "x").exists()
+
+
+def kill_when(command: list[str], ready, sign: int) -> int:
+    """Start a run, send `sign` as soon as `ready()` is true; returns the exit code.
+
+    A shell that runs the tests in the background makes its children ignore SIGINT, so its default
+    is set again.
+    """
+    process = subprocess.Popen(
+        [sys.executable, "-m", "fdnet.cli", *command],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    deadline = time.monotonic() + 60
+    while process.poll() is None and not ready() and time.monotonic() < deadline:
+        time.sleep(0.005)
+    process.send_signal(sign)
+    return process.wait(30)
+
+
+@pytest.mark.parametrize(
+    ("moment", "sign"),
+    [
+        ("invade/history.csv rows", signal.SIGKILL),
+        ("sections.csv", signal.SIGKILL),
+        *(
+            pytest.param(name, signal.SIGKILL, marks=pytest.mark.nightly)
+            for name in ("pack/attempt_1/screen.txt", "pack/stage.json", "figures")
+        ),
+        ("pack/attempt_1/screen.txt", signal.SIGTERM),
+        ("invade/history.csv rows", signal.SIGINT),
+    ],
+)
+def test_a_run_killed_at_any_moment_is_completed_by_resume(whole, tmp_path, moment, sign):
+    run, case, summary = whole
+    out = tmp_path / "run"
+    stages = ["--stages", "pack,invade,analyse" + ",report" * (moment == "figures")]
+    name, _, rows = moment.partition(" ")
+
+    def ready() -> bool:
+        path = out / name
+        return path.exists() and (not rows or path.read_text().count("\n") > 2)
+
+    code = kill_when(["run", str(case), "--out", str(out), *stages], ready, sign)
+    assert code == (-signal.SIGKILL if sign == signal.SIGKILL else 130)
+    assert not (out / "manifest.json").exists()
+    unwhole = fdnet("run", case, "--out", out, *stages)
+    assert unwhole.returncode == 2
+    assert "--resume" in unwhole.stderr
+    resumed = fdnet("run", case, "--out", out, "--resume", "--json", *stages)
+    assert resumed.returncode == 0, resumed.stderr
+    result = json.loads(resumed.stdout)
+    assert result["invaded_count"] == summary["invaded_count"]
+    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
+    assert (out / "spheres_damaged.csv").read_text() == (run / "spheres_damaged.csv").read_text()
+    assert (out / "report.html").exists() == (moment == "figures")
+
+
+def test_two_runs_cannot_write_the_same_folder(tmp_path):
+    case = write_case(tmp_path)
+    out = tmp_path / "run"
+    out.mkdir()
+    lock = os.open(out / ".lock", os.O_RDWR | os.O_CREAT)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    refused = fdnet("run", case, "--out", out)
+    os.close(lock)
+    assert refused.returncode == 2
+    assert "another fdnet run, or fdnet stokes, is writing here" in refused.stderr
+
+
+def test_bad_input_writes_nothing_and_ends_with_2(tmp_path):
+    case, out = write_case(tmp_path), tmp_path / "run"
+    for arguments in (
+        [tmp_path / "none.toml"],
+        [case, "--set", "fines.radius_mm=0.4"],
+        [case, "--np", "0"],
+        [case, "--set", "x"],
+        [case, "--nonsense"],
+        [case, "--set", "run.time_step_s=1e-6"],
+    ):
+        refused = fdnet("run", *arguments, "--out", out)
+        assert refused.returncode == 2, arguments
+        assert len(refused.stderr.strip().splitlines()) == 1, refused.stderr
+        assert not out.exists()
+    missing = fdnet("run", case, "--out", out, "--liggghts", "/nowhere/liggghts")
+    assert missing.returncode == 3
+    assert "LIGGGHTS not found" in missing.stderr
+    assert not out.exists()
+
+
+def test_bad_input_removes_the_parents_it_made_and_no_others(tmp_path):
+    """An empty folder behind a link is left as it was, too."""
+    case = write_case(tmp_path)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "link").symlink_to("empty")
+    for kept, out in (("", "a/b/c"), ("a", "a/b/c"), ("a/b", "a/b/c"), ("", "../link")):
+        (tmp_path / "runs" / kept).mkdir(parents=True, exist_ok=True)
+        before = sorted(tmp_path.rglob("*"))
+        refused = fdnet("run", case, "--set", TOO_DENSE, "--out", tmp_path / "runs" / out)
+        assert refused.returncode == 2
+        assert "grains.count: 110 needs grains that overlap" in refused.stderr
+        assert sorted(tmp_path.rglob("*")) == before, kept
+    assert (tmp_path / "link").is_symlink()
+
+
+def test_a_folder_that_cannot_be_cleared_does_not_hide_the_refusal(tmp_path, monkeypatch):
+    def stuck(path):
+        raise OSError(errno.EBUSY, "Device or resource busy", str(path))
+
+    monkeypatch.setattr(shutil, "rmtree", stuck)
+    with pytest.raises(
+        CaseError,
+        match=r"needs grains that overlap .*; .*run could not be cleared \(Device or res",
+    ):
+        run_stages(tiny(TOO_DENSE), RunOptions(out=tmp_path / "run", show_progress=False))
+
+
+@pytest.fixture(params=[300, 600])
+def small_disk(tmp_path, request):
+    """A file system of some hundred kB: it fills up early, or when restarts are there already."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={request.param}k", "tmpfs", str(place)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("mounting a small file system needs root")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def test_a_full_disk_is_named_and_room_completes_the_run(whole, small_disk):
+    _, case, summary = whole
+    command = [
+        "run",
+        case,
+        "--out",
+        small_disk / "run",
+        "--stages",
+        "pack,invade,analyse",
+        "--json",
+    ]
+    full = fdnet(*command)
+    words = {3: "the disk is full", 2: "No space left on device; free space"}  # LIGGGHTS, or fdnet
+    assert words[full.returncode] in full.stderr
+    subprocess.run(["mount", "-o", "remount,size=50m", str(small_disk)], check=True)
+    resumed = fdnet(*command, "--resume")
+    assert resumed.returncode == 0, resumed.stderr
+    assert json.loads(resumed.stdout)["k_damaged_m2"] == summary["k_damaged_m2"]
+
+
+def test_two_ranks_complete_a_run(whole, tmp_path, binary):
+    if binary.launcher is None:
+        pytest.skip("no mpirun on this machine")
+    _, case, summary = whole
+    out = tmp_path / "run"
+    done = fdnet("run", case, "--out", out, "--np", "2", "--json", *NUMBERS)
+    assert done.returncode == 0, done.stderr
+    invaded = json.loads(done.stdout)["invaded_count"]
+    assert abs(invaded - summary["invaded_count"]) < 0.2 * summary["invaded_count"]
+    assert "processors 1 * *" in (out / "invade" / "in.invade").read_text()
+
+
+def test_an_intact_pack_needs_no_fines_and_mobile_grains_give_a_moved_permeability(tmp_path):
+    case = tmp_path / "case.toml"
+    text = tiny("grains.count=70").toml()
+    case.write_text(text[: text.index("[fines]")] + text[text.index("[fluid]") :])
+    done = fdnet("run", case, "--out", tmp_path / "run", "--json")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["stop_reason"] is None
+    assert summary["supplied_count"] == 0
+    assert summary["k_damaged_m2"] == summary["k_initial_m2"]
+    assert any("no fines" in item for item in summary["left_out"])
+    case = write_case(tmp_path, "grains.motion=mobile")
+    done = fdnet("run", case, "--out", tmp_path / "mobile", "--json", *NUMBERS)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert summary["k_damaged_m2"] <= summary["k_moved_m2"]
+
+
+def test_render_writes_decks_and_scales_without_a_binary(tmp_path, monkeypatch):
+    monkeypatch.setenv("FDNET_LIGGGHTS", "/nowhere")
+    case = write_case(tmp_path)
+    done = fdnet("render", case, "--out", tmp_path / "decks")
+    assert done.returncode == 0, done.stderr
+    assert "Carman-Kozeny permeability" in done.stdout
+    assert (tmp_path / "decks" / "pack" / "pack.data").exists()
+    again = fdnet("render", case, "--out", tmp_path / "decks")
+    assert again.returncode == 2
+    assert "is there already" in again.stderr
+
+
+def test_help_is_quick_to_import():
+    """The heavy libraries are imported only by the commands that need them."""
+    heavy = ("numpy", "pandas", "pyvista", "scipy")
+    code = (
+        "import sys, atexit, fdnet.cli\n"
+        f"atexit.register(lambda: print([m for m in {heavy} if m in sys.modules]))\n"
+        "fdnet.cli.main(['run', '--help'])\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert done.stdout.strip().endswith("[]")

@@ -1,0 +1,503 @@
+"""Scales against the numbers of the thesis and closed forms worked out by hand."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from builders import resting_spheres, tiny, told
+from scipy.integrate import quad
+
+from fdnet.case.case import Case
+from fdnet.case.file import case_from, read_case, set_keys
+from fdnet.dem.checkpoint import chunks_of
+from fdnet.dem.invasion import invade
+from fdnet.dem.liggghts import Launch
+from fdnet.errors import CaseError
+from fdnet.scales.clock import relaxation_time
+from fdnet.scales.contacts import series
+from fdnet.scales.flow import Losses, carman_kozeny, impact_stokes, radial, straight
+from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.table import scale_rows
+from fdnet.spheres.snapshot import Array, Kind
+
+
+@pytest.fixture
+def specimen1(root):
+    case = read_case(root / "cases" / "specimen1.toml")
+    return case, scales_of(case)
+
+
+def test_specimen_1_has_the_velocities_of_the_thesis(specimen1):
+    _, scales = specimen1
+    assert scales.permeability == pytest.approx(7.65e-11, rel=1e-3)
+    assert scales.darcy_velocity == pytest.approx(0.670, rel=1e-3)
+    assert scales.interstitial_velocity == pytest.approx(2.23, rel=2e-3)
+    assert scales.reynolds == pytest.approx(8, abs=0.3)
+    assert any("Reynolds" in warning for warning in scales.warnings)
+    assert carman_kozeny(0.5, 1e-3) == pytest.approx(1e-6 * 0.125 / (180 * 0.25), rel=1e-12)
+
+
+def test_relaxation_times():
+    for diameter_mm, microseconds in [(0.05, 5.96), (0.10, 23.8), (0.16, 61.0)]:
+        with told(diameter_mm, microseconds):
+            assert relaxation_time(0.5e-3 * diameter_mm, 2146, 0.05) == pytest.approx(
+                1e-6 * microseconds, rel=2e-3
+            )
+
+
+def test_springs_in_series_and_smaller_friction(specimen1):
+    _, scales = specimen1
+    nominal = {
+        name: contact.normal_stiffness / scales.stiffness_factor
+        for name, contact in scales.contacts.items()
+    }
+    assert nominal["grain-grain"] == pytest.approx(47.15e9)
+    assert nominal["grain-fine"] == pytest.approx(37.77e9, rel=1e-3)
+    assert nominal["fine-fine"] == pytest.approx(31.5e9)
+    assert scales.contacts["fine-wall"].friction == 0.0
+    assert scales_of(tiny("fines.friction=0.2")).contacts["grain-fine"].friction == 0.2
+    assert series(2.0, 2.0) == 1.0
+    used = scales.contacts
+    assert max(c.normal_stiffness for c in used.values()) == pytest.approx(1e4)
+    ratio = used["fine-fine"].normal_stiffness / used["grain-grain"].normal_stiffness
+    assert ratio == pytest.approx(31.5 / 47.15, rel=1e-9)
+
+
+FOLLOWED = ("drag.field=network", "drag.upstream=darcy", "fines.supply=slab", "fines.count=100")
+
+
+def test_stiffness_auto_is_the_least_that_keeps_overlaps_small():
+    for model in ["hooke", "hertz"]:
+        with told(model):
+            keys = (
+                *FOLLOWED,
+                "drag.scheme=implicit",
+                f"contact.model={model}",
+                "fluid.velocity_m_s=5",
+            )
+            auto = scales_of(tiny(*keys, "run.stiffness_N_m=auto"))
+            deepest = [auto.impact_overlap, auto.drag_overlap, auto.deposit_overlap]
+            assert max(deepest) == pytest.approx(0.03, rel=0.1)
+            assert max(deepest) <= 0.03
+            number = max(c.normal_stiffness for c in auto.contacts.values() if "fine" in c.pair)
+            stiffness = max(c.normal_stiffness for c in auto.contacts.values())
+            chosen = stiffness if model == "hooke" else number
+            same = scales_of(tiny(*keys, f"run.stiffness_N_m={chosen!r}"))
+            assert same.deposit_overlap == pytest.approx(auto.deposit_overlap, rel=1e-9)
+            assert not any("overlap" in warning for warning in auto.warnings)
+
+
+def test_a_pack_of_stiffness_auto_depends_on_what_decides_it():
+    one, other = (
+        tiny("run.stiffness_N_m=auto", f"fluid.velocity_m_s={v!r}").digest("pack")
+        for v in (1e-3, 9.0)
+    )
+    slow = scales_of(tiny("run.stiffness_N_m=auto", "fluid.velocity_m_s=1e-3")).contacts
+    assert max(c.normal_stiffness for c in slow.values()) == pytest.approx(1e4), "the default"
+    assert one != other
+    assert len({tiny(f"fluid.velocity_m_s={v!r}").digest("pack") for v in (1e-3, 9.0)}) == 1
+
+
+def test_damping_rate_gives_the_damping_ratio():
+    case = tiny("fines.damping_ratio=0.3", "grains.damping_ratio=0.3")
+    contact = scales_of(case).contacts["fine-fine"]
+    mass = 4 / 3 * math.pi * (0.05e-3) ** 3 * 2146 / 2
+    assert contact.damping_rate == pytest.approx(
+        2 * 0.3 * math.sqrt(contact.normal_stiffness / mass)
+    )
+
+
+def test_damping_takes_the_mass_of_what_moves():
+    """A frozen grain is infinitely heavy, in LIGGGHTS too.
+
+    The rate is 2 zeta sqrt(k / m), with 1/m = 1/m_fine + 1/m_grain if the grain moves.
+    """
+    for motion, heavy in [("fixed", 0.0), ("mobile", 1.0)]:
+        with told(motion, heavy):
+            contact = scales_of(
+                tiny("fines.radius_mm=0.2", "fines.count=60", f"grains.motion={motion}")
+            ).contacts["grain-fine"]
+            fine, grain = (
+                4 / 3 * math.pi * r**3 * rho for r, rho in ((0.2e-3, 2146), (0.25e-3, 2650))
+            )
+            assert contact.damping_rate == pytest.approx(
+                2 * 0.2 * math.sqrt(contact.normal_stiffness * (1 / fine + heavy / grain))
+            )
+
+
+def test_supply_from_count_and_from_slab():
+    counted = scales_of(tiny())
+    assert counted.slab_length == pytest.approx(
+        300 * 4 / 3 * math.pi * (0.05e-3) ** 3 / (0.1 * 1.6e-3**2)
+    )
+    slab = scales_of(tiny("fines={radius_mm=0.05, slab_mm=0.5}"))
+    assert slab.supplied_count == round(
+        0.1 * 0.5e-3 * 1.6e-3**2 / (4 / 3 * math.pi * (0.05e-3) ** 3)
+    )
+
+
+def test_doubtful_input_warns():
+    text = " ".join(scales_of(tiny("drag.refresh_steps=300")).warnings)
+    assert "held for" in text
+    assert "overlap under impact" in text
+    assert "fewer than 10 fines" in " ".join(scales_of(tiny("run.plug_time_ms=0.0001")).warnings)
+    assert "lengthened to one fine's diameter" in " ".join(
+        scales_of(tiny("fines.count=1")).warnings
+    )
+    assert "overlap under drag" in " ".join(scales_of(tiny("drag.multiplier=40")).warnings)
+
+
+def test_drag_that_presses_contacts_shut_is_refused():
+    """6 pi mu M r u / k over 2 r: at M = 1000 a fine would be pressed through a grain."""
+    with pytest.raises(CaseError, match="drag alone would press"):
+        scales_of(tiny("drag.multiplier=1000"))
+
+
+def test_an_inviscid_fluid_is_refused_for_its_speed_and_works_with_a_given_one():
+    """Darcy's law makes 1e-12 cP a speed of 1e14 m/s; at a given 1 m/s the fines fly freely."""
+    with pytest.raises(CaseError, match=r"impact alone would press a fine .* lower the velocity"):
+        scales_of(tiny("fluid.viscosity_cP=1e-12"))
+    scales = scales_of(tiny("fluid.viscosity_cP=1e-12", "fluid.velocity_m_s=1.0"))
+    assert any("Reynolds" in warning for warning in scales.warnings)
+    assert scales.drag_overlap == pytest.approx(0, abs=1e-12)
+
+
+def test_impact_is_refused_above_half_a_diameter():
+    scales = scales_of(tiny("fluid.velocity_m_s=1.0"))
+    limit = 0.5 / scales.impact_overlap
+    assert scales_of(tiny(f"fluid.velocity_m_s={0.999 * limit}")).impact_overlap == pytest.approx(
+        0.4995
+    )
+    with pytest.raises(CaseError, match="impact alone"):
+        scales_of(tiny(f"fluid.velocity_m_s={1.001 * limit}"))
+    assert "overlap under impact" not in " ".join(scales_of(tiny("run.max_overlap=0.2")).warnings)
+
+
+def test_extreme_numbers_are_refused_not_crashed_on():
+    for assignment in [
+        "fluid.overbalance_MPa=1e-17",
+        "fluid.viscosity_cP=1e15",
+        "run.time_step_s=1e-18",
+    ]:
+        with told(assignment), pytest.raises(CaseError):
+            scales_of(tiny(assignment))
+
+
+def test_the_plug_time_waits_for_fines_to_arrive():
+    """A dilute suspension: 10 v / (c A u) is longer than 4 grain diameters of passage."""
+    case = tiny("fines={radius_mm=0.1, count=60, concentration=0.001}")
+    scales = scales_of(case)
+    arrival = 4 / 3 * math.pi * 1e-4**3 / (0.001 * 1.6e-3**2 * scales.upstream_velocity)
+    assert scales.plug_time == pytest.approx(10 * arrival)
+    assert scales_of(tiny()).plug_time == pytest.approx(
+        4 * 0.5e-3 / scales_of(tiny()).interstitial_velocity
+    )
+
+
+def test_a_duration_is_met_by_whole_chunks():
+    """To half a refresh of drag a chunk, whichever way the steps of a chunk were rounded."""
+    for duration_ms, stiffness in itertools.product(
+        [0.08, 0.2, 2.0], [1e2, 3e2, 1e3, 3e3, 1e4, 1e5, 1e6]
+    ):
+        with told(duration_ms, stiffness):
+            case = tiny(
+                f"run.duration_ms={duration_ms!r}",
+                f"run.stiffness_N_m={stiffness!r}",
+                "fluid.velocity_m_s=5.0",
+            )
+            scales = scales_of(case)
+            chunks, refresh = chunks_of(case, scales), scales.hold_steps * scales.time_step
+            run = chunks * scales.checkpoint_steps * scales.time_step
+            assert abs(run - duration_ms * 1e-3) <= 0.5001 * chunks * refresh
+
+
+def test_a_cap_is_reached_by_whole_chunks():
+    """The least number of chunks of 0.09 ms that does not end before the cap, also for 0.12 ms."""
+    for cap_ms, expected in [(0.05, 1), (0.09, 1), (0.12, 2), (0.18, 2), (0.2, 3)]:
+        with told(cap_ms, expected):
+            case = tiny(f"run.cap_ms={cap_ms}", "run.checkpoint_ms=0.09", "fluid.velocity_m_s=5.0")
+            scales = scales_of(case)
+            chunk = scales.checkpoint_steps * scales.time_step
+            assert chunks_of(case, scales) == expected
+            assert (expected - 1) * chunk < cap_ms * 1e-3 <= expected * chunk * (1 + 1e-9)
+
+
+def test_every_row_has_formula_source_and_a_finite_value(specimen1):
+    for row in scale_rows(*specimen1):
+        assert row.formula
+        assert row.source
+        assert math.isfinite(row.value)
+
+
+def test_defaults_follow_the_physics():
+    """Periodic sides, or walls as rough as the grains; mud that arrives as fast as it flows in."""
+    tables = {
+        "name": "plain",
+        "box": {"size_mm": [3.0, 1.6, 1.6]},
+        "grains": {"radius_mm": 0.25, "count": 66, "friction": 0.3},
+        "fines": {"radius_mm": 0.05, "count": 300},
+    }
+    plain = case_from(tables)
+    assert plain.periodic == (False, True, True)
+    assert plain.fines.supply == "batches"
+    scales = scales_of(plain)
+    assert scales.upstream_velocity == scales.darcy_velocity
+    contact = scales.contacts["grain-fine"].step_limit
+    assert scales.time_step == pytest.approx(0.2 * contact, rel=1e-12)
+
+    def frictions(**walls: float) -> list[float]:
+        walled = case_from(tables | {"box": tables["box"] | {"sides": "walls"} | walls})
+        return [scales_of(walled).contacts[f"{name}-wall"].friction for name in ("grain", "fine")]
+
+    assert frictions() == [0.3, 0.3]
+    assert frictions(wall_friction=0.1) == [0.1, 0.1]
+
+
+# ------------------------------------------------------------------------------------------------
+# The velocity at the formation face: a plug, a well, Darcy's law and Ergun's.
+
+
+WELL = "well={radius_mm=108.0, drainage_radius_m=100.0}"
+
+
+GRADIENT = 3.5e6 / (0.108 * math.log(100 / 0.108))
+"""Of 3.5 MPa at the face, radial Darcy flow: 4.7 MPa/m."""
+
+
+def at_a_well(name: str, root, *assignments: str) -> Case:
+    """A specimen of the thesis at the face of a well instead of in a plug of 8 mm."""
+    data = read_case(root / f"cases/{name}.toml").data()
+    del data["fluid"]["darcy_length_mm"]
+    return case_from(set_keys(data, [WELL, *assignments]))
+
+
+def test_a_well_of_the_field_moves_the_fluid_at_centimetres_per_second(root):
+    for name, speed in [("specimen1", 0.024), ("specimen5", 0.059)]:
+        with told(name, speed):
+            plug, well = (
+                scales_of(read_case(root / f"cases/{name}.toml")),
+                scales_of(at_a_well(name, root)),
+            )
+            assert pytest.approx(4.744e6, rel=1e-3) == GRADIENT
+            assert well.pressure_gradient == pytest.approx(GRADIENT, rel=1e-12)
+            assert plug.pressure_gradient == pytest.approx(3.5e6 / 8e-3, rel=1e-12)
+            assert plug.pressure_gradient / well.pressure_gradient == pytest.approx(92.2, abs=0.1)
+            assert well.interstitial_velocity == pytest.approx(speed, abs=5e-4)
+            assert well.interstitial_velocity == pytest.approx(
+                well.permeability * GRADIENT / 0.05 / well.porosity, rel=1e-12
+            )
+            assert not any("Darcy" in one or "overbalance" in one for one in well.warnings)
+
+
+def test_a_formation_tighter_than_the_pack_slows_the_fluid(root):
+    own, tight = (
+        scales_of(at_a_well("specimen5", root, *more))
+        for more in ((), ("well.formation_permeability_mD=1000.0",))
+    )
+    assert tight.darcy_velocity == pytest.approx(9.869233e-13 / 0.05 * GRADIENT, rel=1e-12)
+    # the gradient is that which drives this flow through the pack itself
+    lower = tight.darcy_velocity / own.darcy_velocity
+    assert tight.pressure_gradient == pytest.approx(lower * GRADIENT, rel=1e-12)
+
+
+def test_a_well_and_another_velocity_are_one_error():
+    for more, named in [
+        (("fluid.velocity_m_s=1.0",), "velocity_m_s = 1:"),
+        (("fluid.darcy_length_mm=8.0",), "darcy_length_mm = 8:"),
+    ]:
+        with told(more, named):
+            with pytest.raises(CaseError, match="1 problem: well: the table") as caught:
+                tiny(WELL, *more)
+            assert named in str(caught.value)
+            assert "keep one of them" in str(caught.value)
+
+
+def test_a_well_must_be_smaller_than_its_drainage():
+    with pytest.raises(CaseError, match=r"well\.drainage_radius_m: 0\.1 m is not above"):
+        tiny("well={radius_mm=108.0, drainage_radius_m=0.1}")
+    with pytest.raises(CaseError, match=r"unknown key .*did you mean well\.radius_mm"):
+        tiny("well={radius_m=0.108, drainage_radius_m=100.0}")
+
+
+def test_a_case_that_names_no_way_is_told_what_a_well_would_give():
+    """66 grains in 3 x 1.6 x 1.6 mm; 3.5 MPa over 3 mm instead of over 0.738 m."""
+    warning = next(one for one in scales_of(tiny()).warnings if "overbalance" in one)
+    scales = scales_of(tiny())
+    slower = scales.interstitial_velocity * 3e-3 / (0.108 * math.log(100 / 0.108))
+    assert f"{scales.interstitial_velocity:.3g} m/s" in warning
+    assert f"would be {slower:.2g} m/s: add the table [well]" in warning
+    for way in (WELL, "fluid.darcy_length_mm=3.0", "fluid.velocity_m_s=0.1"):
+        assert not any("overbalance" in one for one in scales_of(tiny(way)).warnings)
+
+
+def test_inertia_takes_a_tenth_to_a_quarter_at_the_gradients_of_the_thesis(root):
+    """Ergun's ratio of the losses, (1.75 / 150) rho q d / (mu (1 - phi)), with the pack's k."""
+    for name, percent in [("specimen1", 10), ("specimen5", 26)]:
+        with told(name, percent):
+            path = root / f"cases/{name}.toml"
+            darcy, ergun = (
+                scales_of(read_case(path)),
+                scales_of(read_case(path, assignments=["fluid.darcy_law=ergun"])),
+            )
+            q, phi = ergun.darcy_velocity, ergun.porosity
+            excess = 1.75 / 150 * 1095 * q * 0.5e-3 / (0.05 * (1 - phi))
+            assert 0.05 * q / ergun.permeability * (1 + excess) == pytest.approx(
+                3.5e6 / 8e-3, rel=1e-12
+            )
+            assert ergun.pressure_gradient == pytest.approx(3.5e6 / 8e-3, rel=1e-12)
+            lost = 1 - q / darcy.darcy_velocity
+            assert lost == pytest.approx(percent / 100, abs=0.005)
+            assert darcy.inertial_loss == ergun.inertial_loss == pytest.approx(lost, rel=1e-12)
+            assert any(f"lower it by {percent} % (Ergun)" in one for one in darcy.warnings)
+            assert not any("Ergun" in one for one in ergun.warnings)
+
+
+def test_the_root_of_the_radial_law_loses_the_pressure_on_the_way():
+    """The second method: the gradient at each distance, summed up numerically."""
+    losses, well, outer = Losses(viscous=2e8, inertial=4e10), 0.1, 30.0
+    face = losses.velocity(5e6, radial(well, outer))
+
+    def gradient(log_r: float) -> float:
+        r = math.exp(log_r)
+        return losses.gradient(face * well / r) * r
+
+    lost, _ = quad(gradient, math.log(well), math.log(outer))
+    assert lost == pytest.approx(5e6, rel=1e-9)
+    assert losses.velocity(5e6, straight(0.2)) == pytest.approx(
+        (-2e8 + math.sqrt(4e16 + 4 * 4e10 * 5e6 / 0.2)) / 8e10, rel=1e-9
+    )
+    assert Losses(viscous=2e8).velocity(5e6, straight(0.2)) == pytest.approx(0.125, rel=1e-15)
+
+
+def test_the_table_of_scales_says_by_which_law(root):
+    formulas = {
+        row.name: row.formula
+        for case in (at_a_well("specimen5", root, "fluid.darcy_law=ergun"),)
+        for row in scale_rows(case, scales_of(case))
+    }
+    assert formulas["Darcy velocity"] == (
+        "mu q r_w ln(r_e/r_w) / k + b q^2 r_w^2 (1/r_w - 1/r_e) = dP"
+    )
+    assert formulas["pressure gradient in the pack"] == "mu q / k + b q^2"
+
+
+# ------------------------------------------------------------------------------------------------
+# Fines driven at a chosen velocity: the same ratios of forces, and the clock of the fluid.
+
+
+def driven(*assignments: str) -> InvasionScales:
+    return scales_of(tiny(WELL, *assignments))
+
+
+def test_the_impact_stokes_number_by_hand():
+    """m v / (6 pi mu r^2) = (2/9) rho r v / mu, v that of a free fine."""
+    scales = driven()
+    mass = 4 / 3 * math.pi * 5e-5**3 * 2146
+    by_hand = mass * scales.interstitial_velocity / (6 * math.pi * 0.05 * 5e-5**2)
+    assert scales.impact_stokes == pytest.approx(by_hand, rel=1e-12)
+    pushed = driven("drag.pressure_gradient=true")
+    ratio = 2 / 9 * 5e-5**2 * pushed.porosity / pushed.permeability
+    assert pushed.impact_stokes == pytest.approx((1 + ratio) * by_hand, rel=1e-12)
+    assert impact_stokes(2.0, 3.0, 4.0) == 1.5
+
+
+def test_the_simulation_is_driven_and_the_fluid_keeps_its_velocity():
+    plain, fast = driven(), driven("drag.drive_velocity_m_s=0.5", "drag.upstream=darcy")
+    assert plain.force_factor == 1.0
+    assert plain.drive_velocity == plain.interstitial_velocity
+    assert fast.interstitial_velocity == plain.interstitial_velocity
+    assert fast.drive_velocity == 0.5
+    assert fast.force_factor == pytest.approx(0.5 / plain.interstitial_velocity, rel=1e-12)
+    assert fast.upstream_velocity == pytest.approx(0.5 * plain.porosity, rel=1e-12)
+    rows = {
+        one.symbol: one.value
+        for one in scale_rows(tiny(WELL, "drag.drive_velocity_m_s=0.5"), fast)
+    }
+    assert rows["u_DEM"] == 0.5
+    assert rows["s"] == pytest.approx(0.5 / rows["u"], rel=1e-12)
+    # what belongs to the fluid is that of the fluid, what belongs to contacts is as simulated
+    for name in ("reynolds", "gravity_over_drag", "pressure_gradient", "relaxation_time"):
+        assert getattr(fast, name) == getattr(plain, name), name
+    for name in ("stokes", "impact_stokes", "impact_overlap", "drag_overlap"):
+        assert getattr(fast, name) == pytest.approx(
+            fast.force_factor * getattr(plain, name), rel=1e-12
+        ), name
+
+
+def test_auto_drives_to_a_tenth_or_as_fast_as_the_fluid():
+    assert driven("drag.drive_velocity_m_s=auto").impact_stokes == pytest.approx(0.1, rel=1e-12)
+    own = ("fluid.velocity_m_s=1.0", "drag.drive_velocity_m_s=auto")
+    assert scales_of(tiny(*own)).force_factor == 1.0
+
+
+def test_the_times_of_a_case_are_those_of_the_fluid():
+    """Three times as fast, in a third of the time."""
+    for key in ["duration", "plug_time", "cap", "checkpoint"]:
+        with told(key):
+            speed = driven().interstitial_velocity
+            keys = {"checkpoint": 2.0, "plug_time": 40.0} | {
+                key: 60.0 if key != "checkpoint" else 4.0
+            }
+            given = [f"run.{name}_ms={value}" for name, value in keys.items()]
+            slow, fast = driven(*given), driven(*given, f"drag.drive_velocity_m_s={3 * speed}")
+            assert fast.plug_time == pytest.approx(slow.plug_time / 3, rel=1e-12)
+            assert fast.cap_time == pytest.approx(slow.cap_time / 3, rel=1e-12)
+            chunk = [one.checkpoint_steps * one.time_step for one in (slow, fast)]
+            assert chunk[1] == pytest.approx(chunk[0] / 3, rel=0.01)
+
+
+def test_a_drive_that_inertia_forbids_is_refused():
+    most = 5e-5 / scales_of(tiny()).relaxation_time[0]
+    with pytest.raises(CaseError, match=r"impact Stokes number 2 .*at most") as caught:
+        driven(f"drag.drive_velocity_m_s={2 * most}")
+    assert f"expected at most {most:.2g} m/s" in str(caught.value)
+    with pytest.raises(CaseError, match="in the fluid itself"):
+        scales_of(tiny(f"fluid.velocity_m_s={2 * most}", "drag.drive_velocity_m_s=0.1"))
+    with pytest.raises(CaseError, match="in the fluid itself"):
+        scales_of(tiny(f"fluid.velocity_m_s={2 * most}", "drag.drive_velocity_m_s=auto"))
+    keys = ("contact.model=hertz", "contact.cohesion_J_m3=1e4")
+    with pytest.raises(CaseError, match=r"drag\.drive_velocity_m_s: auto with .*cohesion is not"):
+        tiny("drag.drive_velocity_m_s=auto", *keys)
+
+
+def test_a_drive_near_the_bound_warns():
+    most = 0.3 * 5e-5 / scales_of(tiny()).relaxation_time[0]
+    texts = " ".join(driven(f"drag.drive_velocity_m_s={1.5 * most}").warnings)
+    assert "impact Stokes number is 0.45 (above 0.3)" in texts
+    assert f"lower it to {most:.2g} m/s" in texts
+    assert "inertia may" not in " ".join(driven(f"drag.drive_velocity_m_s={most}").warnings)
+    assert "inertia may" not in " ".join(scales_of(tiny()).warnings)
+
+
+@pytest.mark.liggghts
+def test_driven_fines_go_the_same_way_in_a_part_of_the_time(binary, tmp_path):
+    """Between 16 grains, with gravity across: each of 30 fines ends where the slow fluid takes it.
+
+    They go 30 of their radii and sink by two. Inertia leaves about the impact Stokes number (0.02
+    and 0.07) times a radius at each contact.
+    """
+    keys = (
+        "box={size_mm=[3.0, 1.6, 1.6], sides='periodic'}",
+        "fines={radius_mm=0.05, count=30}",
+        "fluid={viscosity_cP=50.0, velocity_m_s=0.05}",
+        "gravity={mode='on', acceleration_m_s2=[0.0, 0.0, -300.0]}",
+        "run={stiffness_N_m=30.0, duration_ms=30.0, time_step_factor=0.2}",
+    )
+    places = [(i, j) for i in range(4) for j in range(4)]
+    centres = [[4e-4 + 3e-4 * ((i + j) % 2), 2e-4 + 4e-4 * i, 2e-4 + 4e-4 * j] for i, j in places]
+
+    def ends(velocity: float) -> Array:
+        case = tiny(*keys, f"drag.drive_velocity_m_s={velocity}")
+        box = np.column_stack([np.zeros(3), case.size_m])
+        grains = resting_spheres(centres, 1.7e-4, box, kind=Kind.GRAIN)
+        folder = tmp_path / str(velocity)
+        result = invade(case, scales_of(case), grains, folder, Launch(binary=binary))
+        fines = result.damaged.fines()
+        return fines.position[np.argsort(fines.id)]
+
+    away = ends(0.15) - ends(0.05)
+    away[:, 1:] -= 1.6e-3 * np.round(away[:, 1:] / 1.6e-3)
+    in_radii = np.linalg.norm(away, axis=1) / 5e-5
+    assert np.median(in_radii) < 0.1
+    assert in_radii.max() < 0.3
