@@ -1,45 +1,52 @@
-"""Compiled code is kept apart for every state of the sources."""
+"""Compiled code: a cache that follows the sources and is never trusted; several cores."""
 
 import ast
 import os
 import shutil
 import subprocess
 import sys
-import tempfile
+import threading
 
 import numba
 import numpy as np
 import pytest
+from numba.core import config
 
 from fdnet.network import compiled as module
-from fdnet.network.compiled import _own_folder, cache_folder
+from fdnet.network.compiled import cache_folder, on_all_cores
+from fdnet.network.laws import deposit_resistances as deposit
+from fdnet.network.laws import lubrication
+from fdnet.network.network import build_network
+from fdnet.network.permeability import analyse
+from tests.network.packs import random_pack, with_fines
 
 
-def test_a_changed_source_has_a_cache_of_its_own(tmp_path):
+def call(command, folder, **settings):
+    environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")} | settings
+    environment.pop("NUMBA_CACHE_DIR", None)
+    return subprocess.run(
+        [sys.executable, *command],
+        env=environment,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_every_state_of_sources_and_settings_has_a_cache_of_its_own(tmp_path, monkeypatch):
+    assert "numba-" in str(numba.config.CACHE_DIR)
     (tmp_path / "one.py").write_text("a = 1\n")
     (tmp_path / "two.py").write_text("b = 1\n")
     before = cache_folder(tmp_path, tmp_path / "cache")
     assert cache_folder(tmp_path, tmp_path / "cache") == before
+    for setting in ("OPT", "USING_SVML"):
+        with monkeypatch.context() as other:
+            other.setattr(numba.config, setting, "other")
+            assert cache_folder(tmp_path, tmp_path / "cache") != before
     (tmp_path / "two.py").write_text("b = 2\n")
     assert cache_folder(tmp_path, tmp_path / "cache") != before
-
-
-def test_compiled_code_lies_there():
-    assert "numba-" in str(numba.config.CACHE_DIR)
-
-
-def test_a_folder_that_others_may_have_filled_is_not_used(tmp_path, monkeypatch):
-    """In a place all can write to, code of somebody else must not be run."""
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    own = _own_folder(tmp_path / "own")
-    assert own == tmp_path / "own"
-    assert _own_folder(own) == own
-    assert own.stat().st_mode & 0o077 == 0
-    (tmp_path / "open").mkdir()
-    (tmp_path / "open").chmod(0o777)
-    (tmp_path / "link").symlink_to(own)
-    for name in ("open", "link"):
-        assert _own_folder(tmp_path / name) not in (tmp_path / name, own)
 
 
 def test_an_installation_in_another_place_uses_the_same_code(tmp_path, root):
@@ -54,19 +61,15 @@ def test_an_installation_in_another_place_uses_the_same_code(tmp_path, root):
         os.utime(path, (1e9, 1e9))  # numba before 0.68 asks for the age of the source
     answers = []
     for place in (root, tmp_path):
-        said = call([sys.executable, "-P", "-c", ask], tmp_path, PYTHONPATH=str(place))
+        said = call(["-P", "-c", ask], tmp_path, PYTHONPATH=str(place))
         answers.append(said.stdout.split() or said.stderr)
     (first, value, compiled), (second, same, read) = answers
-    assert (first, second) == (
-        str(root / "fdnet/__init__.py"),
-        str(tmp_path / "fdnet/__init__.py"),
-    )
+    assert [first, second] == [str(one / "fdnet/__init__.py") for one in (root, tmp_path)]
     assert (value, compiled, read) == (same, "0", "1")
 
 
 SOURCE = """
 import sys
-from fdnet.network.fines import deposit
 from fdnet.network.compiled import compiled
 
 @compiled
@@ -75,148 +78,88 @@ def twice(x):
 
 print(twice(int(sys.argv[1])), twice.stats.cache_hits and 1 or 0)
 """
-
-
-@pytest.fixture
-def cached(tmp_path):
-    """A program with one compiled function, run once: command and folder of its cache."""
-    (tmp_path / "program.py").write_text(SOURCE)
-    first = call_program(tmp_path)
-    assert (first.stdout.split(), first.stderr) == (["42", "0"], "")
-    second = call_program(tmp_path)
-    assert second.stdout.split() == ["42", "1"]
-    return tmp_path
-
-
-def call_program(folder):
-    return call([sys.executable, str(folder / "program.py"), "21"], folder)
-
-
-def call(command, folder, **settings):
-    environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")} | settings
-    environment.pop("NUMBA_CACHE_DIR", None)
-    return subprocess.run(
-        command, env=environment, cwd=folder, capture_output=True, text=True, timeout=120
-    )
-
-
-def flipped(content: bytes) -> bytes:
-    middle = len(content) * 2 // 3
-    return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
-
-
 SPOILT = {
     "empty": lambda content: b"",
-    "cut": lambda content: content[: len(content) // 2],
-    "zeros": lambda content: bytes(len(content)),
-    "one bit": flipped,
+    "one bit": lambda content: content[:90] + bytes([content[90] ^ 1]) + content[91:],
 }
 
 
-@pytest.mark.parametrize("kind", ["nbi", "nbc"])
-@pytest.mark.parametrize("how", SPOILT)
-def test_a_bad_cache_is_left_aside_and_made_anew(cached, kind, how):
-    files = list(cached.rglob(f"program.twice*.{kind}"))
-    assert len(files) == 1
-    files[0].write_bytes(SPOILT[how](files[0].read_bytes()))
-    again = call_program(cached)
-    assert again.stdout.split() == ["42", "0"], again.stderr
-    assert again.stderr.count("\n") == 1
-    assert str(files[0].parent) in again.stderr
-    mended = call_program(cached)
-    assert (mended.stdout.split(), mended.stderr) == (["42", "1"], "")
+def test_a_bad_or_foreign_cache_is_left_aside_and_made_anew(tmp_path):
+    """A program with one compiled function; a spoilt file costs one sentence and no result."""
+    (tmp_path / "program.py").write_text(SOURCE)
 
+    def answer(read, said):
+        done = call(["program.py", "21"], tmp_path)
+        assert done.stdout.split() == ["42", str(int(read))], done.stderr
+        assert done.stderr.count("\n") == said, done.stderr
+        return done.stderr
 
-def test_a_cache_that_cannot_be_written_is_done_without(cached):
-    """A folder in the place of the index stands for a full disk: writing fails."""
-    for path in cached.rglob("program.twice*.nbi"):
+    answer(False, 0)
+    for kind, how in (("nbi", "empty"), ("nbc", "one bit")):
+        (file,) = tmp_path.rglob(f"program.twice*.{kind}")
+        file.write_bytes(SPOILT[how](file.read_bytes()))
+        assert str(file.parent) in answer(False, 1), (kind, how)
+    answer(True, 0)
+    # a folder in the place of the index stands for a full disk: writing fails
+    for path in tmp_path.rglob("program.twice*.nbi"):
         path.unlink()
         path.mkdir()
         (path / "x").write_text("")
         path.with_name(path.name + ".bad").write_text("")
-    again = call_program(cached)
-    assert again.stdout.split() == ["42", "0"], again.stderr
-    assert 1 <= again.stderr.count("\n") <= 2
-    assert "Traceback" not in again.stderr
+    said = call(["program.py", "21"], tmp_path)
+    assert said.stdout.split() == ["42", "0"], said.stderr
+    assert 1 <= said.stderr.count("\n") <= 2
+    assert "Traceback" not in said.stderr
 
 
-def test_a_full_disk_under_the_cache_is_reported_once(tmp_path, monkeypatch, capsys):
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(module.IndexDataCacheFile, "_open_for_write", full)
-    module._said.clear()
-    file = module._CheckedFile(str(tmp_path), "name", "stamp")
-    for key in ("a", "b"):
-        file.save(key, 1)
-        assert file.load(key) is None
-    text = capsys.readouterr().err
-    assert text.count("\n") == 1
-    assert str(tmp_path) in text
-    assert "No space left" in text
+def test_a_cache_in_a_place_that_others_can_write_is_not_used(tmp_path):
+    """Code of somebody else must not be run: where ~/.cache cannot be written, a folder of ours."""
+    (tmp_path / "program.py").write_text(SOURCE)
+    (tmp_path / "cache").write_text("a file, so no folder for the cache")
+    own = tmp_path / f"fdnet-{os.getuid()}"
+    ask = "import fdnet.network.compiled, numba; print(numba.config.CACHE_DIR)"
+    for mode, taken in ((0o777, False), (0o700, True)):
+        own.mkdir(exist_ok=True)
+        own.chmod(mode)
+        said = call(["-c", ask], tmp_path, TMPDIR=str(tmp_path)).stdout.strip()
+        assert said.startswith(str(tmp_path))
+        assert said.startswith(f"{own}/") == taken, oct(mode)
 
 
-def test_code_of_another_signature_is_not_run(tmp_path, capsys):
-    """Two processes that save at the same moment may take one name for their codes."""
-    module._said.clear()
-    file = module._CheckedFile(str(tmp_path), "name", "stamp")
-    for key in ("a", "b"):
-        file.save(key, f"code of {key}")
-    assert file.load("a") == "code of a"
-    file._save_index({"a": file._data_name(2), "b": file._data_name(2)})
-    assert file.load("a") is None
-    assert "another signature" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("setting", ["OPT", "USING_SVML"])
-def test_code_by_other_settings_of_numba_lies_apart(tmp_path, monkeypatch, setting):
-    before = cache_folder(tmp_path, tmp_path)
-    monkeypatch.setattr(numba.config, setting, "other")
-    assert cache_folder(tmp_path, tmp_path) != before
+# numba must not round otherwise than written: whoever calls a function first, in loops or not.
 
 
 @module.loops_in_place
-def _first_of_new(numbers):
+def first_of_new(numbers):
     return np.zeros(len(numbers))[0]
 
 
-def test_a_function_in_place_may_not_make_an_array():
-    """Nobody would count who holds it, so it would never be given back."""
-    with pytest.raises(numba.core.errors.NumbaError, match="array"):
-        _first_of_new(np.ones(3))
-
-
 @module.compiled
-def _product_less(one, two, three):
+def product_less(one, two, three):
     return one * two - three
 
 
 @module.loops_in_place
-def _asked_by_loops(one, two, three):
-    return _product_less(one, two, three)
-
-
-def test_a_function_is_compiled_the_same_whoever_calls_it_first():
-    """Else it would keep the rounding of that caller, here and in later processes."""
-    one = 1.0 + 2.0**-30
-    rounded = one * one
-    assert _asked_by_loops(one, one, rounded) == 0.0
-    assert _product_less(one, one, rounded) == 0.0
+def asked_by_loops(one, two, three):
+    return product_less(one, two, three)
 
 
 @module.compiled_for_loops
-def _product_less_in_loops(one, two, three):
+def product_less_in_loops(one, two, three):
     return one * two - three
 
 
-def test_no_function_rounds_other_than_written():
+def test_no_function_rounds_other_than_written_whoever_calls_it_first():
     """A fused product and sum would not be 0, and which copy is fused depends on the process."""
     one = 1.0 + 2.0**-30
-    assert _product_less_in_loops(one, one, one * one) == 0.0
+    for function in (asked_by_loops, product_less, product_less_in_loops):
+        assert function(one, one, one * one) == 0.0
 
 
-def test_no_function_in_place_returns_an_array(root):
-    """A caller that counts references would give it back too early."""
+def test_a_function_in_place_makes_and_returns_no_array(root):
+    """Nobody would count who holds it, so it would never be given back, or too early."""
+    with pytest.raises(numba.core.errors.NumbaError, match="array"):
+        first_of_new(np.ones(3))
     for path in (root / "fdnet/network").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.FunctionDef):
@@ -237,15 +180,64 @@ def test_a_run_compiles_next_to_liggghts(tmp_path):
         "            break\n"
         "        time.sleep(0.1)\n"
     )
-    inherited = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    cache = {**inherited, "XDG_CACHE_HOME": str(tmp_path)}
     for said in (True, False):
-        done = subprocess.run(
-            [sys.executable, "-c", code, str(tmp_path)],
-            capture_output=True,
-            text=True,
-            check=True,
-            env=cache,
-        )
+        done = call(["-c", code, str(tmp_path)], tmp_path)
+        assert done.returncode == 0, done.stderr
         assert ("compiling, once for this version" in done.stderr) == said
         assert list(tmp_path.rglob("*.nbi"))
+
+
+# ------------------------------------------------------------------------------------------------
+# Several cores.
+
+
+def test_parts_are_done_side_by_side_and_their_results_are_in_order(monkeypatch):
+    monkeypatch.setattr(config, "NUMBA_NUM_THREADS", 3)
+    meet, done = threading.Barrier(3, timeout=30), []
+
+    def work(part):
+        meet.wait()  # three at a time, or this breaks
+        done.append(part)
+        return 10 * part
+
+    assert on_all_cores(work, iter(range(12))) == [10 * part for part in range(12)]
+    assert sorted(done) == list(range(12))
+
+    def inner(_):  # a part takes no more cores of its own
+        return len(set(on_all_cores(lambda _: threading.get_ident(), range(8))))
+
+    assert on_all_cores(inner, range(4)) == [1] * 4
+    pair = threading.Barrier(2, timeout=30)
+
+    def alone(_):  # a single part stays in this thread and may take all cores
+        on_all_cores(lambda _: pair.wait(), range(2))
+        return threading.get_ident()
+
+    assert on_all_cores(alone, range(1)) == [threading.get_ident()]
+
+
+def test_the_error_of_a_part_is_raised(monkeypatch):
+    def work(part):
+        if part == 5:
+            raise ValueError("part 5 failed")
+
+    for cores in (1, 4):
+        monkeypatch.setattr(config, "NUMBA_NUM_THREADS", cores)
+        with pytest.raises(ValueError, match="part 5 failed"):
+            on_all_cores(work, range(9))
+
+
+def test_several_cores_give_the_same_bits_as_one(monkeypatch):
+    pack = with_fines(random_pack(40), 150, 0.2)
+    together = build_network(pack, periodic="yz")
+    for part_of in (lubrication, deposit):
+        monkeypatch.setattr(part_of, "THROATS", 60)
+    assert deposit.bounded_by_fines(together).sum() > 4 * 60  # several parts for each of the laws
+    results = []
+    for cores in (1, 4):
+        monkeypatch.setattr(config, "NUMBA_NUM_THREADS", cores)
+        halves = [deposit.deposit_resistances(together), lubrication.half_resistances(together)]
+        analysis = analyse(pack, periodic="yz", sections=3, damage_law="section-archie")
+        results.append((halves, [(one.k_initial, one.k_damaged) for one in analysis.sections]))
+    assert results[0][1] == results[1][1]
+    np.testing.assert_array_equal(results[0][0], results[1][0])

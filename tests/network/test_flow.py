@@ -1,72 +1,70 @@
-"""Flow through networks small enough to know the answer, and by a second method."""
+"""Flow through networks small enough to know the answer, by second methods, over many decades."""
 
 import numpy as np
+import pyamg
 import pytest
 
 from fdnet.errors import FlowError
+from fdnet.network.flow import solver
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.flow.sections import inplace_permeability, plane_pressures, slab_permeability
-from fdnet.network.laws.named import LAWS
+from fdnet.network.flow.solver import (
+    DIRECT,
+    MULTIGRID,
+    Balances,
+    balance_links,
+    cancelling_pressures,
+    stiffness,
+    winding_groups,
+)
+from fdnet.network.laws.named import LAWS, effective_law
 from fdnet.network.network import build_network
+from tests.network.exact import exact_balance, random_links
 from tests.network.networks import chain, network_of, random_network
 from tests.network.packs import random_pack, snapshot
 
-
-@pytest.mark.parametrize("count", [1, 2, 7])
-def test_chain_of_equal_throats_conducts_g_over_n(count):
-    flow = solve_flow(chain(count), np.full(count, 3.0))
-    assert flow.inflow == pytest.approx(3.0 / count)
-    assert flow.pore_pressure == pytest.approx(1 - np.arange(count + 1) / count)
-    assert flow.throat_flux == pytest.approx(3.0 / count)
+ALL, SIDES = (True,) * 3, (False, True, True)
 
 
-def test_one_tube_is_poiseuille():
+def test_chains_of_throats_in_closed_form():
+    """n equal throats conduct g / n; one tube pi r^4 / 8 over a unit cross-section (Poiseuille)."""
+    for count in (1, 2, 7):
+        flow = solve_flow(chain(count), np.full(count, 3.0))
+        assert flow.inflow == pytest.approx(3.0 / count)
+        assert flow.pore_pressure == pytest.approx(1 - np.arange(count + 1) / count)
+        assert flow.throat_flux == pytest.approx(3.0 / count)
     network = chain(1, step=2.0)
     k = solve_flow(network, LAWS["thesis"](network)).inflow * 2.0 / network.area
-    assert k == pytest.approx(np.pi * 0.1**4 / 8)  # pi r^4 / 8 over a unit cross-section
-
-
-def test_slab_splits_throats_at_its_planes():
-    """A chain of unit steps cut from 0.25 to 2.5 conducts g / 2.25."""
+    assert k == pytest.approx(np.pi * 0.1**4 / 8)
+    # a slab splits throats at its planes
     flow = solve_flow(chain(4), np.full(4, 1.0), span=(0.25, 2.5))
     assert flow.inflow == pytest.approx(1 / 2.25)
     assert flow.mass_balance < 1e-12
+    within = solve_flow(chain(2), np.full(2, 1.0), span=(0.2, 0.6))
+    assert within.inflow == pytest.approx(1 / 0.4)
 
 
-def test_slab_within_one_throat():
-    assert solve_flow(chain(2), np.full(2, 1.0), span=(0.2, 0.6)).inflow == pytest.approx(1 / 0.4)
-
-
-@pytest.mark.parametrize(
-    ("resistances", "carrying"),
-    [([1, 1, 1, 1], 4.0), ([1, 3], 16 / 10), ([1, 0, 0, 0], 1.0), ([1, 1, 0], 2.0)],
-)
-def test_throats_in_series_carry_the_flow_by_their_share_of_the_energy(resistances, carrying):
-    g = 1.0 / np.maximum(np.array(resistances, float), 1e-9)
-    flow = solve_flow(chain(len(g)), g)
-    assert flow.carrying_throats == pytest.approx(carrying)
-
-
-def test_no_throat_carries_where_nothing_flows():
+def test_throats_carry_the_flow_by_their_share_of_the_energy():
+    for resistances, carrying in [
+        ([1, 1, 1, 1], 4.0),
+        ([1, 3], 16 / 10),
+        ([1, 0, 0, 0], 1.0),
+        ([1, 1, 0], 2.0),
+    ]:
+        g = 1.0 / np.maximum(np.array(resistances, float), 1e-9)
+        assert solve_flow(chain(len(g)), g).carrying_throats == pytest.approx(carrying)
     assert solve_flow(chain(2), np.array([1.0, 0.0])).carrying_throats == 0.0
 
 
-def test_random_network_against_the_pseudo_inverse():
+def test_a_random_network_against_the_pseudo_inverse():
     network, g = random_network()
     flow = solve_flow(network, g)
-    first, second = network.throat_pores.T
     laplacian = np.zeros((30, 30))
-    np.add.at(laplacian, (first, second), -g)
+    np.add.at(laplacian, tuple(network.throat_pores.T), -g)
     laplacian += laplacian.T
     np.fill_diagonal(laplacian, -laplacian.sum(axis=1))
-    held = np.arange(8)
-    inner = np.arange(8, 30)
     pressure = np.append(np.ones(4), np.zeros(4))
-    solved = (
-        np.linalg.pinv(laplacian[np.ix_(inner, inner)])
-        @ -laplacian[np.ix_(inner, held)]
-        @ pressure
-    )
+    solved = np.linalg.pinv(laplacian[8:, 8:]) @ -laplacian[8:, :8] @ pressure
     inflow = (laplacian @ np.append(pressure, solved))[:4].sum()
     assert flow.inflow == pytest.approx(inflow, rel=1e-7)
     tied = np.isfinite(flow.pore_pressure[8:])
@@ -74,118 +72,267 @@ def test_random_network_against_the_pseudo_inverse():
     assert flow.mass_balance < 1e-9
 
 
-def test_cut_off_pores_are_counted_and_have_no_pressure():
+def test_cut_off_pores_are_counted_and_no_open_path_is_zero_with_its_reason():
     position = [[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, 2, 0], [0.5, 3, 0]]
     network = network_of(position, [(0, 1), (2, 3), (0, 4)], [[0, 1], [0, 3], [0, 1]])
     flow = solve_flow(network, np.ones(3))
     assert flow.inflow == pytest.approx(1.0)
     assert flow.isolated_pores == 3  # two on their own, one dead end that misses the outlet
     assert np.isnan(flow.pore_pressure[2:]).all()
+    periodic = build_network(random_pack(50), periodic=ALL)
+    inner = np.where(periodic.throat_shift[:, 0] != 0, 0.0, 1.0)  # nothing crosses the x face
+    blocked = [(chain(3), np.array(g, float)) for g in ([0, 1, 1], [1, 0, 1], [0, 0, 0])]
+    for network, g in [*blocked, (periodic, inner)]:
+        flow = solve_flow(network, g)
+        assert flow.inflow == 0.0
+        assert "no open path" in flow.reason
+        assert flow.mass_balance is None
+    # slabs beside a closed throat still have a k
+    network, g = chain(3), np.array([1.0, 0.0, 1.0])
+    spans = ((0.0, 0.9), (0.9, 2.1), (1.2, 1.8), (2.1, 3.0))
+    k = [slab_permeability(network, g, span)[0] for span in spans]
+    assert k == pytest.approx([1.0, 0.0, 0.0, 1.0])
+    in_place = inplace_permeability(network, solve_flow(network, g), np.array([0.0, 0.9, 3.0]))
+    assert in_place.tolist() == [0.0, 0.0]
 
 
-@pytest.mark.parametrize("blocked", [[0], [1], [0, 1, 2]])
-def test_no_open_path_is_zero_with_its_reason(blocked):
-    g = np.ones(3)
-    g[blocked] = 0.0
-    flow = solve_flow(chain(3), g)
-    assert flow.inflow == 0.0
-    assert "no open path" in flow.reason
-    assert flow.mass_balance is None
+def test_a_bad_conductance_is_refused_with_its_throat():
+    for bad in (np.nan, np.inf, -1.0):
+        with pytest.raises(FlowError, match="throat 1"):
+            solve_flow(chain(3), np.array([1.0, bad, 1.0]))
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -1.0])
-def test_bad_conductance_is_refused_with_its_throat(bad):
-    with pytest.raises(FlowError, match="throat 1"):
-        solve_flow(chain(3), np.array([1.0, bad, 1.0]))
+# ------------------------------------------------------------------------------------------------
+# Periods.
 
 
-def test_twelve_decades_with_blocked_throats_still_balance():
-    pack = random_pack(120)
-    network = build_network(pack, periodic=(False, True, True), walls="slip")
-    rng = np.random.default_rng(4)
-    g = 10.0 ** rng.uniform(-12, 0, len(network.throat_pores)) * (
-        rng.random(len(network.throat_pores)) > 0.25
-    )
-    flow = solve_flow(network, g)
-    assert flow.mass_balance < 1e-6
-    assert flow.inflow > 0
-    for pore in np.flatnonzero((network.pore_share == 1) & np.isfinite(flow.pore_pressure))[:50]:
-        out = flow.throat_flux[network.throat_pores[:, 0] == pore].sum()
-        assert out == pytest.approx(
-            flow.throat_flux[network.throat_pores[:, 1] == pore].sum(), abs=1e-9 * flow.inflow
-        )
-
-
-def three_in_a_row(pack):
+@pytest.fixture(scope="module")
+def periods():
+    """A periodic network, and the one of three copies in a row between planes; its edge."""
+    pack = random_pack(50)
     edge = pack.box[0, 1]
     place = np.vstack([pack.position + np.array([n * edge, 0, 0]) for n in range(3)])
-    return snapshot(place, 1.0, pack.box * [[3], [1], [1]])
+    row = snapshot(place, 1.0, pack.box * [[3], [1], [1]])
+    three = build_network(row, periodic=SIDES, walls="slip")
+    return build_network(pack, periodic=ALL), three, edge
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("span", [(0.0, 1.0), (0.2, 0.7), (0.0, 0.3)])
-def test_slab_of_a_period_is_the_slab_of_the_middle_copy(law, span):
+def test_a_period_is_the_middle_copy_of_three(periods):
     """Throats across the periodic x face belong to both ends of the box."""
-    pack = random_pack(50)
-    edge = pack.box[0, 1]
-    one = build_network(pack, periodic=(True,) * 3)
-    three = build_network(three_in_a_row(pack), periodic=(False, True, True), walls="slip")
-    low, high = np.array(span) * edge
-    inflow = solve_flow(one, LAWS[law](one), span=(low, high)).inflow
-    assert inflow == pytest.approx(
-        solve_flow(three, LAWS[law](three), span=(low + edge, high + edge)).inflow, rel=1e-5
-    )
-
-
-def test_period_of_a_pack_is_the_limit_of_many_periods_between_planes():
-    """Of three copies in a row between pressure planes the middle one takes the period's flow."""
-    pack = random_pack(50)
-    edge = pack.box[0, 1]
-    one = build_network(pack, periodic=(True,) * 3)
-    three = build_network(three_in_a_row(pack), periodic=(False, True, True), walls="slip")
-    for law in LAWS.values():
+    one, three, edge = periods
+    for name, law in LAWS.items():
+        for span in ((0.0, 1.0), (0.2, 0.7), (0.0, 0.3)):
+            low, high = np.array(span) * edge
+            inflow = solve_flow(one, law(one), span=(low, high)).inflow
+            middle = solve_flow(three, law(three), span=(low + edge, high + edge)).inflow
+            assert inflow == pytest.approx(middle, rel=1e-5), (name, span)
+        # the endless pack is the limit of many periods between pressure planes
         flow = solve_flow(three, law(three))
         pressure = plane_pressures(three, flow, np.array([edge, 2 * edge]))
         middle = flow.inflow / (pressure[0] - pressure[1])
-        assert solve_flow(one, law(one)).inflow == pytest.approx(middle, rel=0.03)
+        assert solve_flow(one, law(one)).inflow == pytest.approx(middle, rel=0.03), name
 
 
-def test_period_without_a_way_round_is_zero():
-    network = build_network(random_pack(50), periodic=(True,) * 3)
-    g = np.where(network.throat_shift[:, 0] != 0, 0.0, 1.0)  # nothing crosses the x face
-    flow = solve_flow(network, g)
-    assert flow.inflow == 0.0
-    assert "no open path" in flow.reason
-
-
-@pytest.mark.parametrize(("turns", "inflow"), [((1, 1), 0.0), ((1, 0), 0.5)])
-def test_period_across_and_back_is_no_way_round(turns, inflow):
+def test_a_period_across_and_back_is_no_way_round():
     """Two throats of 1 in parallel that both cross the x face close no loop.
 
     If one of them does not cross it, they are in series.
     """
-    shift = np.array([[turn, 0, 0] for turn in turns])
-    network = network_of(
-        [[0.2, 0, 0], [0.8, 0, 0]],
-        [(0, 1), (0, 1)],
-        [[0, 1]] * 3,
-        periodic=(True, False, False),
-        throat_shift=shift,
-    )
-    flow = solve_flow(network, np.ones(2))
-    assert flow.inflow == pytest.approx(inflow)
-    assert bool(flow.reason) == (inflow == 0)
-    assert flow.isolated_pores == (2 if inflow == 0 else 0)
+    for turns, inflow in [((1, 1), 0.0), ((1, 0), 0.5)]:
+        network = network_of(
+            [[0.2, 0, 0], [0.8, 0, 0]],
+            [(0, 1), (0, 1)],
+            [[0, 1]] * 3,
+            periodic=(True, False, False),
+            throat_shift=np.array([[turn, 0, 0] for turn in turns]),
+        )
+        flow = solve_flow(network, np.ones(2))
+        assert flow.inflow == pytest.approx(inflow)
+        assert bool(flow.reason) == (inflow == 0)
+        assert flow.isolated_pores == (2 if inflow == 0 else 0)
 
 
-def test_slab_without_a_path_has_no_k_though_its_neighbours_do():
-    """The middle throat of three is closed, so the whole and all slabs that hold it have k = 0."""
-    network, g = chain(3), np.array([1.0, 0.0, 1.0])
-    k = [
-        slab_permeability(network, g, span)[0]
-        for span in ((0.0, 0.9), (0.9, 2.1), (1.2, 1.8), (2.1, 3.0))
-    ]
-    assert k == pytest.approx([1.0, 0.0, 0.0, 1.0])
-    assert inplace_permeability(
-        network, solve_flow(network, g), np.array([0.0, 0.9, 3.0])
-    ).tolist() == [0.0, 0.0]
+# ------------------------------------------------------------------------------------------------
+# Direct and multigrid.
+
+
+def links(count=400):
+    """A ring with chords, conductances over four decades; one node in ten tied to pressure 0."""
+    rng = np.random.default_rng(2)
+    ring = np.stack([np.arange(count), (np.arange(count) + 1) % count], 1)
+    pair = np.concatenate([ring, rng.integers(count, size=(count, 2))])
+    tied = np.where(np.arange(count) % 10 == 0, 1.0, 0.0)
+    return pair, 10.0 ** rng.uniform(-4.0, 0, len(pair)), tied, rng.random(count)
+
+
+def test_both_methods_satisfy_every_balance(monkeypatch):
+    """In any unit of conductance and flux."""
+    pair, g, tied, source = links()
+    for limit, method in ((0, MULTIGRID), (10_000, DIRECT)):
+        monkeypatch.setattr(solver, "DIRECT_UP_TO", limit)
+        for unit in (1e-12, 1.0, 1e12):
+            balances = Balances(pair, g * unit, tied * unit)
+            p = balances.solve(source * unit, imbalance=1e-9 * unit)
+            flux = g * (p[pair[:, 0]] - p[pair[:, 1]])
+            net = np.bincount(pair[:, 0], flux, 400) - np.bincount(pair[:, 1], flux, 400)
+            assert net + tied * p == pytest.approx(source, abs=1e-8), (method, unit)
+            assert balances.method == method
+
+
+def test_multigrid_and_direct_agree_on_packs_and_both_balance(monkeypatch):
+    """Also over twelve decades with a fourth of the throats blocked."""
+    for periodic in (SIDES, ALL):
+        network = build_network(random_pack(120), periodic=periodic, walls="slip")
+        count, rng = len(network.throat_pores), np.random.default_rng(4)
+        for decades, blocked in ((0, 0.0), (12, 0.0), (12, 0.25)):
+            spread = 10.0 ** rng.uniform(-decades, 0, count) * (rng.random(count) >= blocked)
+            g, flows = effective_law(network) * spread, []
+            for limit in (0, 10_000):
+                monkeypatch.setattr(solver, "DIRECT_UP_TO", limit)
+                flows.append(solve_flow(network, g))
+            first, second = flows
+            assert [first.method, second.method] == [MULTIGRID, DIRECT]
+            assert first.inflow == pytest.approx(second.inflow, rel=1e-8)
+            assert second.inflow > 0
+            near = 1e-8 * second.inflow
+            assert first.throat_flux == pytest.approx(second.throat_flux, abs=near)
+            assert second.mass_balance < 1e-6
+            one, two = network.throat_pores.T
+            pores = len(network.pore_share)
+            net = np.bincount(one, second.throat_flux, pores) - np.bincount(
+                two, second.throat_flux, pores
+            )
+            inner = (network.pore_share == 1) & np.isfinite(second.pore_pressure)
+            assert np.abs(net[inner]).max() < 1e-8 * second.inflow
+
+
+def test_a_cycle_is_pyamgs_own_and_symmetric(monkeypatch):
+    """pyamg's, without the norms that it computes next to it."""
+    made, build = [], pyamg.ruge_stuben_solver
+
+    def kept(*given, **named):
+        made.append(build(*given, **named))
+        return made[0]
+
+    monkeypatch.setattr(solver.pyamg, "ruge_stuben_solver", kept)
+    pair, g, tied, source = links()
+    cycle, other = solver.ruge_stuben(solver.laplacian(pair, g, tied)), np.roll(source, 7)
+    assert len(made[0].levels) > 2
+    assert np.array_equal(cycle(source), made[0].aspreconditioner() @ source)
+    assert source @ cycle(other) == pytest.approx(other @ cycle(source), rel=1e-12)
+
+
+def test_multigrid_solves_pores_without_neighbours():
+    """A thin slab has pores, or pairs of pores, that are tied to the planes alone.
+
+    There is nothing to coarsen. It takes seconds, where a dense solve of the coarsest level would
+    take minutes and gigabytes.
+    """
+    tied = np.linspace(1.0, 2.0, 6000)
+    for pairs in (0, 3000):
+        balances = Balances(np.arange(2 * pairs).reshape(-1, 2), np.ones(pairs), tied)
+        assert balances.solve(tied) == pytest.approx(np.ones(6000))
+        assert balances.method == MULTIGRID
+
+
+def test_direct_takes_over_where_multigrid_fails_and_what_neither_can_solve_is_refused(
+    monkeypatch,
+):
+    with pytest.raises(FlowError, match="no way out"):
+        Balances(np.zeros((0, 2), int), np.zeros(0), np.zeros(3)).solve(np.ones(3))
+    pair, g, tied, source = links()
+    expected = Balances(pair, g, tied).solve(source)
+    monkeypatch.setattr(solver, "DIRECT_UP_TO", 0)
+    monkeypatch.setattr(solver, "CG_STEPS", 1)
+    balances = Balances(pair, g, tied)
+    assert balances.solve(source, imbalance=1e-9) == pytest.approx(expected)
+    assert balances.method == DIRECT
+    monkeypatch.setattr(solver, "MEMORY_CAP", 1e4)
+    with pytest.raises(FlowError, match=r"400 pores: multigrid did not converge .* GB of"):
+        Balances(pair, g, tied).solve(source)
+
+
+# ------------------------------------------------------------------------------------------------
+# Balances over many decades.
+
+NODES = 16
+
+
+@pytest.mark.parametrize("period", [False, True])
+def test_fluxes_against_rational_arithmetic(period):
+    """The error of every flux, over the throughput."""
+    for decades, within in [(6, 1e-9), (12, 1e-8), (16, 1e-8), (20, 1e-6)]:
+        solved = 0
+        for seed in range(25):
+            ends, g, jump = random_links(seed, decades=decades, period=period)
+            if not winding_groups(ends, jump, NODES)[1].all():
+                continue
+            solved += 1
+            throughput, exact = exact_balance(ends, g, jump, NODES)
+            flux = balance_links(ends, g, jump, NODES).flux
+            assert flux @ jump == pytest.approx(throughput, rel=within)
+            assert flux == pytest.approx(exact, abs=within * throughput)
+            net = np.bincount(ends[:, 0], flux, NODES) - np.bincount(ends[:, 1], flux, NODES)
+            assert np.abs(net[1:]).max() <= 1e-6 * throughput
+        assert solved > 15
+
+
+def test_chains_and_groups_sixteen_decades_apart():
+    """Resistances add, and every link takes the same flux; parallel paths share as they conduct."""
+    for g in (
+        np.array([1e-16, 1.0, 1e-8, 1.0, 1e-16]),
+        10.0 ** -np.array([0, 4, 8, 12, 16, 12, 8, 4, 0]),
+    ):
+        flow = solve_flow(chain(len(g)), g)
+        assert flow.inflow == pytest.approx(1.0 / np.sum(1.0 / g), rel=1e-12)
+        assert flow.throat_flux == pytest.approx(flow.inflow, rel=1e-9)
+    position = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]
+    network = network_of(position, [(0, 1), (1, 2), (1, 2), (2, 3)], [[0, 3], [0, 1], [0, 1]])
+    flow = solve_flow(network, np.array([1.0, 1e12, 3e12, 1.0]))
+    assert flow.throat_flux / flow.inflow == pytest.approx([1.0, 0.25, 0.75, 1.0], rel=1e-9)
+    # two pores joined by 1 and tied to the flow by 1e-18 have the pressure of their neighbour
+    position = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0], [1, 2, 0]]
+    network = network_of(position, [(0, 1), (1, 2), (1, 3), (3, 4)], [[0, 2], [0, 3], [0, 1]])
+    flow = solve_flow(network, np.array([1.0, 1.0, 1e-18, 1.0]))
+    assert flow.pore_pressure[1:] == pytest.approx([0.5, 0.0, 0.5, 0.5], abs=1e-9)
+
+
+def test_stiffness_counts_contrasts_above_the_weakest_link_of_the_best_way():
+    ends, jump = np.array([(0, 1), (1, 2), (2, 0), (1, 2)]), np.array([1.0, 0.0, 0.0, 0.0])
+    assert stiffness(ends, np.array([1.0, 1e12, 1e-3, 1e-9]), jump, 3).tolist() == [0, 1, 0, 0]
+
+
+def test_only_a_closed_way_with_a_jump_winds():
+    """A triangle 0-1-2 and two pores joined to it.
+
+    A jump there and back closes no loop; three turns do, and parallel links with unlike jumps.
+    """
+    ends = np.array([(0, 1), (1, 2), (2, 0), (2, 3), (3, 4)])
+    for jumps, winds in [
+        ([0, 0, 0, 1, -1], False),
+        ([1, 0, -1, 0, 0], False),
+        ([1, 1, 1, 0, 0], True),
+    ]:
+        group, winding = winding_groups(ends, np.array(jumps, float), 5)
+        assert winding.all() == winding.any() == winds, jumps
+        assert len(set(group)) == 1
+    assert winding_groups(np.array([(0, 1), (0, 1)]), np.array([0.0, 1.0]), 2)[1].all()
+    ends, jump = np.array([(0, 1), (2, 1), (2, 3), (4, 5)]), np.array([1.0, 0.0, -2.0, 3.0])
+    height = cancelling_pressures(ends, jump, 6)  # takes up the jumps of a forest
+    assert (jump + height[ends[:, 0]] - height[ends[:, 1]]).tolist() == [0, 0, 0, 0]
+
+
+def test_contrasts_settle_or_are_refused(monkeypatch):
+    """A group contracted by 1.5e8 includes the link of 0.9e8 in parallel.
+
+    Otherwise each sweep gains a factor of only 0.6. Without contraction sixteen decades cannot be
+    held: no number is better than a wrong one.
+    """
+    monkeypatch.setattr(solver, "CONTRASTS", (1e8,))
+    ends, jump = np.array([(0, 1), (1, 2), (1, 2), (2, 0)]), np.array([1.0, 0.0, 0.0, 0.0])
+    balance = balance_links(ends, np.array([1.0, 1.5e8, 0.9e8, 1.0]), jump, 3)
+    assert balance.defect < 1e-8
+    assert balance.flux == pytest.approx([0.5, 0.5 * 1.5 / 2.4, 0.5 * 0.9 / 2.4, 0.5], abs=1e-7)
+    monkeypatch.setattr(solver, "CONTRASTS", (1e99,))
+    with pytest.raises(FlowError):
+        solve_flow(chain(9), np.array([1e10, 1e6, 1e2, 1e-12, 1e-16, 1e-12, 1e2, 1e6, 1e10]))

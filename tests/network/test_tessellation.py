@@ -1,54 +1,148 @@
-"""The network of a pack: exact porosities, unique pores, matching facets, errors."""
+"""The network of a pack: exact measures, a tiling of the box, certain signs, nodes, counts."""
 
 from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from itertools import permutations, product
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
+from scipy.spatial import ConvexHull, Delaunay
 
 from fdnet.errors import NetworkError
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.flow.sections import whole_permeability
+from fdnet.network.laws.lubrication import half_resistances
+from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
+from fdnet.network.nodes import nodes_of
+from fdnet.network.tessellation import delaunay, triangulation
+from fdnet.network.tessellation.triangulation import in_sphere, side_of_plane, triangulate
 from fdnet.spheres.geometry import measure_porosity
+from tests.network import closed_forms
 from tests.network.packs import body_centred, face_centred, random_pack, simple_cubic, snapshot
 
-ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
+ALL, NONE, SIDES, ONE_WALL = (True,) * 3, (False,) * 3, (False, True, True), (True, False, True)
+LATTICES = {
+    "simple cubic": (simple_cubic(), 1 - np.pi / 6, 27),
+    "face-centred": (face_centred(), 1 - np.pi * np.sqrt(2) / 6, 4 * 27),
+    "body-centred": (body_centred(), 1 - np.pi * np.sqrt(3) / 8, 0),
+}
+"""Pack, porosity, and cells of more than four corners: a cube a grain of simple cubic, an
+octahedron a grain of face-centred, none of body-centred."""
 
 
-@pytest.mark.parametrize(
-    ("pack", "expected"),
-    [
-        (simple_cubic(), 1 - np.pi / 6),
-        (face_centred(), 0.259520),
-        (body_centred(), 1 - np.pi * np.sqrt(3) / 8),
-    ],
-)
-@pytest.mark.parametrize("periodic", [ALL, SIDES])
-def test_void_of_the_pores_is_the_known_porosity(pack, expected, periodic):
-    network = build_network(pack, periodic=periodic, walls="slip")
-    void = np.sum(network.pore_share * network.pore_volume) / np.prod(pack.box[:, 1])
-    if periodic == SIDES:
-        # the mirrored faces cut the lattice, so the porosity comes from chords, a second method
-        chords = measure_porosity(pack, periodic=SIDES, lines=20_000)
-        assert chords.mean > expected + 0.03
-        expected, tolerance = chords.mean, 5 * chords.standard_error
-    else:
-        tolerance = 1e-6
-    assert void == pytest.approx(expected, abs=tolerance)
-    assert network.area == pytest.approx(pack.box[1, 1] ** 2)
+@cache
+def built(count=60, solid=0.58, periodic=ALL, **more):
+    return build_network(random_pack(count, solid, **more), periodic=periodic, walls="slip")
 
 
-def test_pores_of_overlapping_grains_hold_the_same_void_as_chords():
-    pack = random_pack(80, 0.66, spread=0.2)
-    network = build_network(pack, periodic=ALL)
-    porosity = measure_porosity(pack, periodic=ALL, lines=20_000)
-    assert porosity.mean > porosity.sum + 1e-4  # they do overlap
-    void = np.sum(network.pore_volume) / np.prod(pack.box[:, 1])
-    assert void == pytest.approx(porosity.mean, abs=5 * porosity.standard_error + 1e-5)
+def void_of(network):
+    box = np.prod(np.ptp(network.box, axis=1))
+    return np.sum(network.pore_share * network.pore_volume) / box
 
 
-def test_wall_surface_of_touching_grains_is_their_whole_surface():
-    pack = face_centred()
-    network = build_network(pack, periodic=ALL)
-    assert np.sum(network.pore_wall_surface) == pytest.approx(4 * np.pi * len(pack))
+def volume_of(network):
+    return np.sum(network.pore_share * network.pore_tetra_volume)
+
+
+def test_lattices_have_their_known_porosity_and_cells():
+    for name, (pack, expected, groups) in LATTICES.items():
+        network = build_network(pack, periodic=ALL)
+        assert void_of(network) == pytest.approx(expected, abs=1e-9), name
+        assert network.area == pytest.approx(pack.box[1, 1] ** 2)
+        assert np.sum(network.pore_wall_surface) == pytest.approx(4 * np.pi * len(pack))
+        assert network.counts["cospherical_groups"] == groups
+        assert network.counts["throats_overlapping"] == 0
+
+
+def test_touching_spheres_leave_the_textbook_openings():
+    """Porosity 0.220364 and a sphere of 0.224745 of four, 0.161254 r2 and 0.1547 r of three."""
+    network = build_network(face_centred(), periodic=ALL)
+    four = network.pore_radius < 0.3
+    assert network.pore_radius[four] == pytest.approx(np.sqrt(1.5) - 1, rel=1e-6)
+    assert network.pore_radius[~four] == pytest.approx(np.sqrt(2) - 1, rel=1e-6)
+    porosity = network.pore_volume[four] / network.pore_tetra_volume[four]
+    assert porosity == pytest.approx(0.220364, abs=1e-6)
+    ends = network.pore_group[network.throat_pores]
+    three = ends[:, 0] != ends[:, 1]
+    assert network.throat_area[three] == pytest.approx(0.161254, abs=1e-6)
+    assert network.throat_radius[three] == pytest.approx(2 / np.sqrt(3) - 1, rel=1e-6)
+
+
+def test_pores_and_throats_of_unequal_overlapping_grains_are_the_closed_forms():
+    network = built(100, 0.66, spread=0.33)
+    corner, radius = network.pore_corner, network.pore_corner_radius
+    volume = np.abs(closed_forms.signed_volume(corner))
+    assert network.pore_tetra_volume == pytest.approx(volume, rel=1e-9)
+    solid, surface = closed_forms.solid_in_tetrahedra(corner, radius)
+    assert network.pore_volume == pytest.approx(volume - solid, rel=1e-9, abs=1e-12)
+    assert network.pore_wall_surface == pytest.approx(surface, rel=1e-9, abs=1e-12)
+    centre, touching = closed_forms.touching(corner, radius)
+    assert network.pore_radius == pytest.approx(np.nan_to_num(np.maximum(touching, 0)), rel=1e-8)
+    # the place is that centre where it lies within, which is where four parts make up the whole
+    parts = np.zeros(len(corner))
+    for k in range(4):
+        part = corner.copy()
+        part[:, k] = np.nan_to_num(centre, nan=9.0)
+        parts += np.abs(closed_forms.signed_volume(part))
+    within = np.abs(parts / volume - 1.0) < 1e-6
+    assert 10 < within.sum() < len(corner)
+    place = np.where(within[:, None], centre, corner.mean(axis=1))
+    assert network.pore_position == pytest.approx(place, abs=1e-6)
+    power = closed_forms.power_centre(corner, radius)[0]
+    assert network.pore_power_centre == pytest.approx(power, rel=1e-7, abs=1e-7)
+    triangle, disc = network.throat_corner, network.throat_corner_radius
+    circle = np.nan_to_num(np.maximum(closed_forms.touching_circle(triangle, disc), 0.0))
+    assert network.throat_radius == pytest.approx(circle, rel=1e-8, abs=1e-12)
+    opened = np.where(circle > 0, np.maximum(closed_forms.open_area(triangle, disc), 0.0), 0.0)
+    assert network.throat_area == pytest.approx(opened, rel=1e-9, abs=1e-12)
+    apart = np.linalg.norm(triangle - np.roll(triangle, 1, axis=1), axis=2)
+    overlap = np.any(apart < (disc + np.roll(disc, 1, axis=1)) * (1 - 1e-6), axis=1)
+    assert network.counts["throats_overlapping"] == np.sum(overlap & (circle > 0)) > 50
+    normal = np.cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    own = np.sum((power[network.throat_pores[:, 0]] - triangle[:, 0]) * normal, axis=1)
+    assert np.abs(network.throat_heights[:, 0]) == pytest.approx(np.abs(own), abs=1e-6)
+
+
+def test_open_area_between_overlapping_discs_against_a_fine_grid():
+    triangle, radius = np.array([[0, 0, 0], [1.8, 0, 0], [0.8, 1.9, 0.0]]), np.array([1, 0.9, 0.7])
+    x, y = np.meshgrid(np.arange(0.0005, 1.8, 0.001), np.arange(0.0005, 1.9, 0.001))
+    inside = (y * 0.8 < x * 1.9) & (y * (0.8 - 1.8) > (x - 1.8) * 1.9)
+    for corner, size in zip(triangle, radius, strict=True):
+        inside &= (x - corner[0]) ** 2 + (y - corner[1]) ** 2 > size**2
+    area = closed_forms.open_area(triangle[None], radius[None])[0]
+    assert area == pytest.approx(inside.sum() * 1e-6, abs=2e-3)
+
+
+def test_void_of_packs_is_their_porosity_by_chords():
+    """Also where grains overlap, are unequal, are cut by walls or centred beyond one."""
+    walled = random_pack(60, 0.5, periodic=False)
+    beyond = walled.position.copy()
+    beyond[np.argmin(beyond[:, 1]), 1] = -0.4
+    cut = snapshot(beyond, 1.0, walled.box)
+    cases = {
+        "overlapping": (random_pack(80, 0.66, spread=0.2), ALL),
+        "unequal": (random_pack(100, 0.64, spread=0.33), ALL),
+        "next to walls": (random_pack(100, 0.5, periodic=False), ONE_WALL),
+        "cut by walls": (random_pack(100), ONE_WALL),
+        "unequal and cut": (random_pack(100, spread=0.33), ONE_WALL),
+        "centred beyond a wall": (cut, NONE),
+        **{name: (pack, SIDES) for name, (pack, *_) in LATTICES.items()},
+    }
+    for name, (pack, periodic) in cases.items():
+        network = build_network(pack, periodic=periodic, walls="slip")
+        porosity = measure_porosity(pack, periodic=periodic, lines=20_000)
+        box = np.prod(np.ptp(pack.box, axis=1))
+        assert volume_of(network) == pytest.approx(box, rel=1e-12), name
+        near = 5 * porosity.standard_error + 1e-5
+        assert void_of(network) == pytest.approx(porosity.mean, abs=near), name
+        if name == "overlapping":
+            assert porosity.mean > porosity.sum + 1e-4
+        beyond_walls = network.counts["grains_centred_beyond_walls"]
+        assert beyond_walls == (name == "centred beyond a wall"), name
 
 
 def test_wall_surface_hides_the_caps_of_overlapping_pairs():
@@ -57,96 +151,316 @@ def test_wall_surface_hides_the_caps_of_overlapping_pairs():
     apart -= pack.box[:, 1] * np.round(apart / pack.box[:, 1])
     height = np.maximum(1 - 0.5 * np.linalg.norm(apart, axis=2), 0)[~np.eye(80, dtype=bool)]
     assert height.sum() > 0.5
-    surface = np.sum(build_network(pack, periodic=ALL).pore_wall_surface)
+    surface = np.sum(built(80, 0.66).pore_wall_surface)
     assert surface == pytest.approx(4 * np.pi * 80 - 2 * np.pi * height.sum(), rel=1e-9)
 
 
-@pytest.mark.parametrize("periodic", [ALL, SIDES, (True, False, True), NONE])
-def test_tetrahedra_tile_and_facets_pair(periodic):
-    pack = random_pack(120, 0.5, periodic=False)
-    network = build_network(pack, periodic=periodic, walls="slip")
-    assert network.counts["throats_unmatched"] == 0
-    assert (
-        network.throat_heights.sum(axis=1).min() > -1e-9
-    )  # Delaunay: centres in order along the normal
-    places = len(np.unique(network.pore_position, axis=0))  # one for all parts of a polyhedron
-    assert 0.99 * (network.pore_group.max() + 1) < places <= network.pore_group.max() + 1
-    filled = np.sum(network.pore_share * network.pore_tetra_volume)
-    assert filled == pytest.approx(network.area * pack.box[0, 1], rel=1e-12)
-    assert filled == pytest.approx(np.prod(pack.box[:, 1]), rel=1e-12)
-    if periodic == ALL:
-        assert len(network.throat_pores) == 2 * len(network.pore_position)
+def test_tetrahedra_tile_the_box_and_facets_pair():
+    """Also few grains in a wide box, where the first images are too few, and a single layer."""
+    dense = random_pack(120, 0.5, periodic=False)
+    few = [
+        random_pack(n, 0.2, seed=seed, spread=0.3, aspect=0.6) for seed, n in ((2, 12), (4, 19))
+    ]
+    layer = snapshot(np.random.default_rng(0).random((9, 3)) * [8, 8, 0] + 1, 0.1, [[0, 10]] * 3)
+    cases = [(dense, sides) for sides in (ALL, SIDES, ONE_WALL, NONE)] + [(layer, NONE)]
+    for pack, periodic in cases + list(product(few, (ALL, SIDES, ONE_WALL))):
+        network = build_network(pack, periodic=periodic, walls="slip")
+        box = np.prod(np.ptp(pack.box, axis=1))
+        assert network.counts["throats_unmatched"] == 0
+        assert volume_of(network) == pytest.approx(box, rel=1e-12), (len(pack), periodic)
+        if pack is not dense:
+            continue
+        # Delaunay: centres in order along the normal; one place for all parts of a polyhedron
+        assert network.throat_heights.sum(axis=1).min() > -1e-9
+        places, groups = (
+            len(np.unique(network.pore_position, axis=0)),
+            network.pore_group.max() + 1,
+        )
+        assert 0.99 * groups < places <= groups
+        if periodic == ALL:
+            assert len(network.throat_pores) == 2 * len(network.pore_position)
 
 
 def test_throat_ends_are_its_pores_up_to_whole_periods():
-    pack = random_pack(60)
-    network = build_network(pack, periodic=ALL)
-    size = pack.box[:, 1]
-    place = (
-        network.pore_position[network.throat_pores]
-        + np.stack([0 * network.throat_shift, network.throat_shift], axis=1) * size
-    )
+    network = built()
+    size = network.box[:, 1]
+    shift = np.stack([0 * network.throat_shift, network.throat_shift], axis=1) * size
+    place = network.pore_position[network.throat_pores] + shift
     assert network.throat_ends == pytest.approx(place, abs=1e-9)
-    assert np.all(network.pore_position >= 0)
-    assert np.all(network.pore_position < size)
+    assert np.all((network.pore_position >= 0) & (network.pore_position < size))
     # the two places are those next to the facet, not an image of them elsewhere
-    away = np.linalg.norm(
-        network.throat_ends - network.throat_corner.mean(axis=1)[:, None], axis=2
-    )
-    assert away.max() < 2.5
-    # both pores hold the throat's three grains
+    middle = network.throat_corner.mean(axis=1)[:, None]
+    assert np.linalg.norm(network.throat_ends - middle, axis=2).max() < 2.5
     for side in (0, 1):
         grains = network.pore_grains[network.throat_pores[:, side]]
         assert np.all(np.any(grains[:, :, None] == network.throat_grains[:, None], axis=1))
 
 
-def test_pores_on_the_x_faces_lie_on_them():
+def test_pores_on_faces_lie_on_them_and_count_by_their_half():
     pack = random_pack(100, 0.5, periodic=False)
     network = build_network(pack, periodic=SIDES, walls="slip")
-    on_face = network.pore_share < 1
+    on_face, x = network.pore_share < 1, network.pore_position[:, 0]
     assert np.all(network.pore_share[on_face] == 0.5)
-    assert set(network.pore_position[on_face, 0]) == {0.0, pack.box[0, 1]}
-    inner = network.pore_position[~on_face, 0]
-    assert inner.min() > 0
-    assert inner.max() < pack.box[0, 1]
+    assert set(x[on_face]) == set(network.box[0])
+    assert np.all((x[~on_face] > 0) & (x[~on_face] < network.box[0, 1]))
+    network = build_network(simple_cubic(4), periodic=ONE_WALL, walls="slip")
+    both = np.all(network.pore_share[network.throat_pores] < 1, axis=1)
+    assert set(network.throat_share[both]) == {0.5}
+    assert np.all(network.throat_share[~both] == 1)
 
 
-def test_of_two_grains_at_one_place_one_is_left_out():
-    pack = random_pack(30)
-    double = np.vstack(
-        [pack.position, pack.position[7] + [0, pack.box[1, 1], 0]]
-    )  # the image across the period
-    plain = build_network(pack, periodic=ALL)
-    network = build_network(snapshot(double, 1.0, pack.box), periodic=ALL)
-    assert network.counts["grains_inside_others"] == 1
-    assert network.pore_volume.sum() == pytest.approx(plain.pore_volume.sum(), rel=1e-9)
-
-
-def test_three_grains_are_refused():
-    with pytest.raises(NetworkError, match="at least 4"):
-        build_network(snapshot(np.zeros((3, 3)), 0.1, [[0, 10]] * 3), periodic=NONE, walls="slip")
-
-
-def test_one_layer_between_walls_is_a_stack_of_its_mirror_images():
-    position = np.random.default_rng(0).random((9, 3)) * [8, 8, 0] + 1
-    network = build_network(snapshot(position, 0.1, [[0, 10]] * 3), periodic=NONE, walls="slip")
-    assert np.sum(network.pore_share * network.pore_tetra_volume) == pytest.approx(1000, rel=1e-12)
-
-
-def test_grains_out_of_reach_are_left_out_and_counted():
+def test_grains_that_add_nothing_are_left_out_and_counted():
+    """One that is there twice, across the period; one inside another; one out of reach."""
+    for spread, place, radius in ((0.0, None, 1.0), (0.33, [0.3, 0.1, 0.0], 0.4)):
+        pack = random_pack(80, spread=spread)
+        big = pack.position[np.argmax(pack.radius)]
+        more = big + (place or [0, pack.box[1, 1], 0])
+        both = snapshot(np.vstack([pack.position, more]), np.append(pack.radius, radius), pack.box)
+        plain, network = (build_network(one, periodic=ALL) for one in (pack, both))
+        assert plain.counts["grains_hidden"] == plain.counts["grains_inside_others"] == 0
+        assert network.counts["grains_inside_others"] == 1
+        assert network.pore_volume.sum() == pytest.approx(plain.pore_volume.sum(), rel=1e-9)
     pack = random_pack(60, 0.5, periodic=False)
-    position = np.vstack([[[-3.0, 1, 1]], pack.position])
-    network = build_network(
-        snapshot(position, np.append(1.0, pack.radius), pack.box), periodic=NONE, walls="slip"
-    )
-    alone = build_network(pack, periodic=NONE, walls="slip")
+    far = snapshot(np.vstack([[[-3.0, 1, 1]], pack.position]), 1.0, pack.box)
+    network, alone = (build_network(one, periodic=NONE, walls="slip") for one in (far, pack))
     assert network.counts["grains_outside_box"] == 1
     assert np.array_equal(network.pore_grains, alone.pore_grains + 1)
     assert np.array_equal(network.throat_grains, alone.throat_grains + 1)
 
 
-def test_heavily_overlapping_grains_close_throats():
+def test_slivers_are_counted_where_walls_cut_random_packs():
+    assert built(100).counts["slivers"] == 0
+    assert built(100, 0.58, ONE_WALL).counts["slivers"] > 0
+
+
+def test_heavily_overlapping_grains_close_throats_in_every_law():
     pack = random_pack(60)
     network = build_network(replace(pack, radius=pack.radius * 1.25), periodic=ALL)
-    assert network.counts["throats_closed"] == np.sum(network.throat_radius == 0) > 0
+    closed = network.throat_radius == 0
+    assert network.counts["throats_closed"] == closed.sum() > 0
     assert np.all(network.throat_radius >= 0)
+    for name, law in LAWS.items():
+        conductance = law(network)
+        assert np.all(conductance[closed] == 0), name
+        assert np.all(np.isfinite(conductance) & (conductance >= 0)), name
+
+
+def test_bad_packs_and_walls_are_refused():
+    three = snapshot(np.zeros((3, 3)), 0.1, [[0, 10]] * 3)
+    with pytest.raises(NetworkError, match="at least 4"):
+        build_network(three, periodic=NONE, walls="slip")
+    with pytest.raises(NetworkError, match=r"'sticky'.*slip"):
+        build_network(random_pack(60), periodic=NONE, walls="sticky")
+
+
+# ------------------------------------------------------------------------------------------------
+# Power tessellation and the compiled one.
+
+
+def test_power_centres_of_a_body_centred_lattice_of_two_sizes():
+    """The power centre is (a/2, y, 0) with y^2 - R1^2 = (y - a/2)^2 - R2^2.
+
+    The tetrahedron has the corners (0,0,0), (a,0,0) and the centres (a,a,+-a)/2; the powers
+    |x - p|^2 - r^2 are equal.
+    """
+    edge, corner, centre = 2.0, 1.0, 0.7
+    steps = np.indices((3, 3, 3)).reshape(3, -1).T * edge
+    place, radius = np.vstack([steps, steps + 0.5 * edge]), np.repeat([corner, centre], 27)
+    network = build_network(snapshot(place, radius, [[0.0, 3 * edge]] * 3), periodic=ALL)
+    turned = network.pore_power_centre % edge
+    found = np.sort(np.minimum(turned, edge - turned), axis=1)
+    expected = np.sort([edge / 2, edge / 4 + (corner**2 - centre**2) / edge, 0.0])
+    assert found == pytest.approx(np.tile(expected, (len(found), 1)), abs=1e-9)
+    assert len(found) == 12 * 27
+
+
+def test_no_other_grain_has_less_power_at_a_power_centre():
+    pack, network = random_pack(80, spread=0.33), built(80, spread=0.33)
+    steps = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) * pack.box[:, 1]
+    images = (pack.position[:, None] + steps).reshape(-1, 3)
+    away = np.sum((network.pore_power_centre[:, None] - images) ** 2, axis=2)
+    own = np.sum((network.pore_power_centre - network.pore_corner[:, 0]) ** 2, axis=1)
+    least = (away - np.repeat(pack.radius, 27) ** 2).min(axis=1)
+    assert least == pytest.approx(own - network.pore_corner_radius[:, 0] ** 2, abs=1e-9)
+
+
+def test_equal_radii_make_the_network_of_delaunay(monkeypatch):
+    for periodic in (ALL, (False, True, False)):
+        plain = built(120, 0.58, periodic)
+        with monkeypatch.context() as patch:
+            patch.setattr(delaunay, "EQUAL_SPREAD", -1.0)
+            power = build_network(random_pack(120), periodic=periodic, walls="slip")
+        # prisms cut by a wall may be split otherwise
+        for name in ("pore_volume", "throat_radius", "throat_heights") if all(periodic) else ():
+            one, two = (np.sort(getattr(network, name).ravel()) for network in (plain, power))
+            assert one == pytest.approx(two, abs=1e-6)
+        for law in LAWS.values():
+            one, two = (solve_flow(network, law(network)).inflow for network in (plain, power))
+            assert two == pytest.approx(one, rel=1e-6)
+
+
+def test_the_network_does_not_depend_on_who_tessellates(monkeypatch):
+    """Nor where the compiled tessellation finds the points degenerate: Qhull then takes over."""
+    for spread, periodic in product((0.0, 0.3), ("xyz", "")):
+        pack = random_pack(60, 0.55, spread=spread)
+        one = build_network(pack, periodic=periodic)
+        for degenerate in (False, True):
+            with monkeypatch.context() as patch:
+                patch.setattr(delaunay, "COMPILED_FROM", 1)
+                if degenerate:
+                    patch.setattr(delaunay, "triangulate", lambda points, weight: None)
+                other = build_network(pack, periodic=periodic)
+            assert dict(other.counts) == dict(one.counts)
+            assert len(other.throat_pores) == len(one.throat_pores)
+            flows = [solve_flow(net, LAWS["lubrication"](net)).inflow for net in (one, other)]
+            assert flows[1] == pytest.approx(flows[0], rel=1e-10)
+
+
+def determinant(rows):
+    """By Leibniz's sum over all orders of the columns."""
+    total = Fraction(0)
+    for order in permutations(range(len(rows))):
+        turns = sum(a > b for k, a in enumerate(order) for b in order[k + 1 :])
+        product = Fraction((-1) ** turns)
+        for row, column in zip(rows, order, strict=True):
+            product *= row[column]
+        total += product
+    return total
+
+
+def exact_signs(points, weight):
+    """Signs of `side_of_plane` and `in_sphere` of five points in exact arithmetic."""
+    place = [[Fraction(float(x)) for x in row] for row in points]
+    heavy = [Fraction(float(x)) for x in weight]
+    plane = [[x - y for x, y in zip(row, place[3], strict=True)] for row in place[:3]]
+    sphere = []
+    for row, own in zip(place[:4], heavy[:4], strict=True):
+        apart = [x - y for x, y in zip(row, place[4], strict=True)]
+        sphere.append([*apart, sum(x * x for x in apart) - own + heavy[4]])
+    return int(np.sign(determinant(plane))), int(np.sign(determinant(sphere)))
+
+
+def nearly_degenerate(kind, rng):
+    if kind == "any":
+        return 10.0 * rng.random((5, 3))
+    if kind == "a plane, but for the last digits":
+        flat = np.round(10.0 * rng.random((5, 3)), 1)
+        flat[3] = flat[0] + flat[1] - flat[2]
+        return flat + 1e-15 * rng.random((5, 3))
+    ball = rng.normal(size=(5, 3))
+    return 3.0 * ball / np.linalg.norm(ball, axis=1)[:, None]
+
+
+def test_signs_are_those_of_exact_arithmetic_or_none():
+    kinds = ("any", "a plane, but for the last digits", "a sphere, but for the last digits")
+    for seed, kind in enumerate(kinds):
+        rng, certain = np.random.default_rng(seed), 0
+        for case in range(60):
+            points = nearly_degenerate(kind, rng)
+            weight = rng.random(5) if case % 2 and kind == "any" else np.full(5, 0.3)
+            plane, sphere = exact_signs(points, weight)
+            given = side_of_plane(points, 0, 1, 2, 3), in_sphere(points, weight, (0, 1, 2, 3), 4)
+            assert given[0] in (plane, 0), kind
+            assert given[1] in (sphere, 0), kind
+            certain += given == (plane, sphere)
+        assert certain > 50, kind
+    corners = np.indices((2, 2, 2)).reshape(3, -1).T.astype(float)
+    assert in_sphere(corners, np.zeros(8), (0, 1, 2, 4), 7) == 0
+    assert side_of_plane(corners, 0, 1, 2, 3) == 0
+
+
+def rows_of(simplices):
+    return {tuple(row) for row in np.sort(simplices, axis=1).tolist()}
+
+
+def by_qhull(points, square):
+    """Delaunay's tetrahedra, or the lower hull of the points lifted to |x|^2 - r^2."""
+    if np.ptp(square) == 0:
+        return Delaunay(points).simplices
+    about = points - points.mean(axis=0)
+    hull = ConvexHull(np.column_stack([about, np.sum(about**2, axis=1) - square]))
+    return hull.simplices[hull.equations[:, 3] < 0]
+
+
+def test_tetrahedra_are_those_of_qhull_but_for_slivers_at_the_hull(monkeypatch):
+    for spread in (0.0, 0.4):
+        rng = np.random.default_rng(8)
+        points = 10.0 * rng.random((800, 3))
+        square = (spread * (1.0 + rng.uniform(-1, 1, 800))) ** 2
+        made, neighbour = triangulate(points, square)
+        expected = rows_of(by_qhull(points, square))
+        assert rows_of(made) <= expected
+        assert len(rows_of(made)) == len(made) > 0.99 * len(expected)
+        for a, c in zip(*np.nonzero(neighbour >= 0), strict=True):
+            assert set(made[a]) - {made[a, c]} <= set(made[neighbour[a, c]])
+        assert np.sum(neighbour < 0) < 0.1 * len(made)
+    with monkeypatch.context() as small:  # room grows where it is too small
+        small.setattr(triangulation, "HOLE", 8)
+        small.setattr(triangulation, "TETRAHEDRA_A_POINT", 1)
+        assert rows_of(triangulate(points, square)[0]) == rows_of(made)
+    lattice = np.indices((3, 3, 3)).reshape(3, -1).T.astype(float)
+    assert triangulate(lattice, np.zeros(27)) is None, "degenerate points have no tessellation"
+    twice = np.concatenate([points[:20]] * 2)
+    assert triangulate(twice, np.zeros(40)) is None
+
+
+# ------------------------------------------------------------------------------------------------
+# Nodes: power centres, or the points of their tetrahedra that are nearest to them.
+
+
+def nearest_by_search(corner, place):
+    """The point of a tetrahedron nearest to a place, from weights that are searched for."""
+    result = minimize(
+        lambda weight: np.sum((weight @ corner - place) ** 2),
+        np.full(4, 0.25),
+        bounds=[(0.0, 1.0)] * 4,
+        constraints={"type": "eq", "fun": lambda weight: weight.sum() - 1.0},
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    return result.x @ corner
+
+
+def inside(corner, place):
+    weight = np.linalg.solve(np.vstack([corner.T, np.ones(4)]), np.append(place, 1.0))
+    return weight.min() > -1e-9
+
+
+def test_a_node_is_the_point_of_its_tetrahedron_nearest_to_the_power_centre():
+    network = built()
+    nodes, corner, centre = nodes_of(network), network.pore_corner, network.pore_power_centre
+    node, moved = nodes.position, np.any(nodes.position != centre, axis=1)
+    assert 0.1 < moved.mean() < 0.5
+    for p in np.flatnonzero(moved)[:60]:
+        best = nearest_by_search(corner[p], centre[p])
+        assert np.linalg.norm(node[p] - centre[p]) <= np.linalg.norm(best - centre[p]) + 1e-9
+        assert inside(corner[p], node[p])
+    assert all(inside(corner[p], centre[p]) for p in np.flatnonzero(~moved)[:60])
+    # heights are those of the nodes above the facets
+    height, corner = nodes.heights, network.throat_corner
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    shift = np.stack([0 * network.throat_shift, network.throat_shift], axis=1)
+    place = node[network.throat_pores] + shift * np.ptp(network.box, axis=1)
+    apart = np.einsum("tsk,tk->ts", place - corner[:, :1], normal)
+    assert height == pytest.approx(np.abs(apart), abs=1e-9)
+    still = ~moved[network.throat_pores]
+    assert np.all(height[still] == network.throat_heights[still])
+
+
+def test_pores_of_one_polyhedron_keep_its_power_centre():
+    """The cells of a cubic lattice are split into tetrahedra with one centre outside of some."""
+    cubic = build_network(simple_cubic(), periodic=ALL)
+    nodes = nodes_of(cubic)
+    assert np.all(nodes.position == cubic.pore_power_centre)
+    assert np.all(nodes.heights == cubic.throat_heights)
+
+
+def test_nodes_follow_the_spheres_without_a_jump():
+    """A shift of all grains by 1e-7 of a radius, each its own way, moves k by little."""
+    pack, rng = random_pack(60), np.random.default_rng(5)
+    shaken = replace(pack, position=pack.position + rng.uniform(-1e-7, 1e-7, pack.position.shape))
+    k = [
+        whole_permeability(one, 1.0 / half_resistances(one).sum(axis=1))[0]
+        for one in (build_network(spheres, periodic=ALL) for spheres in (pack, shaken))
+    ]
+    assert k[1] == pytest.approx(k[0], rel=1e-4)

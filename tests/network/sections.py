@@ -1,0 +1,218 @@
+"""Sections of throats: the laws asked for a single one, and resolved flow through them.
+
+Flux in m4 is the integral of w over the open part where laplacian(w) = -1 and w = 0 on the discs.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numba
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu, spsolve
+from scipy.spatial import Delaunay
+
+from fdnet.network.laws.cross_section import (
+    LANES,
+    Sections,
+    WallCuts,
+    edge_fluxes,
+    even_fluxes,
+    even_room,
+    tangents,
+    touching_fluxes,
+    uneven_fluxes,
+    uneven_room,
+    wall_fluxes,
+)
+from fdnet.network.laws.wedges import ratio_table
+from fdnet.spheres.snapshot import Array
+
+FIRST = np.zeros(1, int)
+
+
+@cache
+def from_python(function: Any) -> Callable[..., Any]:
+    """A function that compiled functions alone can call (`loops_inside`), for Python."""
+
+    @numba.njit
+    def call(*given: Any) -> Any:
+        return function(*given)
+
+    return call  # type: ignore[no-any-return]
+
+
+def sections_with(discs: Array) -> Sections:
+    """Sections with the radii `discs` (3, n) m of one side of a throat."""
+    none = np.zeros(1)
+    return Sections(throat=FIRST, side=FIRST, low=none, step=none, disc=discs[None].copy())
+
+
+def even_flux(base: Array, disc: float) -> float:
+    """Flux m4 through the triangle `base` (3, 2) m with equal discs of radius `disc` m."""
+    base, flux, given = base[None], np.empty((1, 1)), sections_with(np.full((3, 1), disc))
+    even_fluxes(FIRST, given, base, tangents(base), ratio_table(), even_room(1), flux)
+    return float(flux[0, 0])
+
+
+def uneven_flux(base: Array, disc: Array) -> float:
+    """Flux m4 through the triangle `base` (3, 2) m with discs of the radii `disc` (3,) m."""
+    flux, given = np.empty((1, 1)), sections_with(np.asarray(disc)[:, None])
+    uneven_fluxes(FIRST, given, base[None], ratio_table(), uneven_room(1), flux)
+    return float(flux[0, 0])
+
+
+def touching_flux(base: Array, disc: Array) -> float:
+    """Flux m4 of the signed shares of three discs that a circle touches, else 0."""
+    flux, discs = np.empty(1), np.ascontiguousarray(disc[:, None])
+    from_python(touching_fluxes)(base, discs, ratio_table(), uneven_room(1), flux)
+    return float(flux[0])
+
+
+def wall_flux(place: Any, first: Any, second: Any) -> Any:
+    """Fluxes m4 between the wall and discs of the radii `first` and `second` m, of one or more.
+
+    `place` (3,) m: both heights of the discs above the wall, and how far apart they are along it.
+    """
+    place = np.array(place, float)
+    cuts = WallCuts(order=np.array([[0, 1]]), place=place[None], part=np.ones(1))
+    return _walled(wall_fluxes, np.stack([first, second, second]), cuts)
+
+
+def edge_flux(place: Any, disc: Any) -> Any:
+    """Fluxes m4 between two walls and discs of radius `disc` m, `place` (2,) m away."""
+    cuts = WallCuts(order=np.array([[0, -1]]), place=np.array([[*place, 0.0]]), part=np.ones(1))
+    return _walled(edge_fluxes, np.stack([disc, disc, disc]), cuts)
+
+
+def _walled(law: Any, discs: Array, cuts: WallCuts) -> Any:
+    flux = np.empty((1, discs[0].size))
+    lanes = np.full((LANES, flux.size), np.nan)
+    law(FIRST, sections_with(discs.reshape(3, -1)), cuts, ratio_table(), lanes, flux)
+    return flux[0] if discs.ndim > 1 else flux[0, 0]
+
+
+# ------------------------------------------------------------------------------------------------
+# Triangles with discs, by finite elements on a free mesh.
+
+
+def resolved_flux(
+    base: Array, disc: Array, nodes: int = 800, *, centre: Array | None = None
+) -> float:
+    """Flux m4, w = 0 on the discs and no shear on the sides, extrapolated from two meshes.
+
+    `base` (3, 2) m is the triangle, `disc` (n,) m the radii about `centre` (n, 2) m, by default
+    about its corners.
+    """
+    middle = base if centre is None else centre
+    coarse, fine = (_flux(base, middle, disc, count) for count in (nodes, 4 * nodes))
+    return fine + (fine - coarse) / 3.0
+
+
+def _flux(base: Array, centre: Array, disc: Array, nodes: int) -> float:
+    low, high = base.min(axis=0), base.max(axis=0)
+    x, y = np.meshgrid(np.linspace(low[0], high[0], 200), np.linspace(low[1], high[1], 200))
+    point = np.column_stack([x.ravel(), y.ravel()])
+    share = np.mean(_gap(point[_inside(point, base) > 0], centre, disc) > 0)
+    area = 0.5 * abs(np.linalg.det(base[1:] - base[0]))
+    free, held = _points(base, centre, disc, np.sqrt(area * share / nodes))
+    point = np.concatenate([free, held])
+    corner = Delaunay(point).simplices
+    middle = point[corner].mean(axis=1)
+    corner = corner[(_gap(middle, centre, disc) > 0) & np.any(corner < len(free), axis=1)]
+    a, b, c = (point[corner[:, k]] for k in range(3))
+    twice = np.abs((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
+    flat = twice > 1e-12 * area
+    corner, twice = corner[flat], twice[flat]
+    side = np.stack([c - b, a - c, b - a], axis=1)[flat]
+    block = np.einsum("tik,tjk->tij", side, side) / (2.0 * twice)[:, None, None]
+    rows, columns = np.repeat(corner, 3, axis=1).ravel(), np.tile(corner, (1, 3)).ravel()
+    matrix = sparse.csc_matrix((block.ravel(), (rows, columns)), shape=(len(point),) * 2)
+    load = np.bincount(corner.ravel(), np.repeat(twice / 6.0, 3), minlength=len(point))
+    own = np.flatnonzero(load[: len(free)] > 0)
+    return float(load[own] @ splu(matrix[own][:, own]).solve(load[own]))
+
+
+def _gap(point: Array, centre: Array, disc: Array) -> Array:
+    """Distance (N,) of points (N, 2) from the nearest rim, negative within a disc."""
+    apart = np.linalg.norm(point[:, None] - centre, axis=2)
+    return np.asarray((apart - disc).min(axis=1))
+
+
+def _inside(point: Array, base: Array) -> Array:
+    """Least distance (N,) of points from the sides of a triangle turned to the left."""
+    ends = np.roll(base, -1, axis=0) - base
+    normal = np.column_stack([-ends[:, 1], ends[:, 0]]) / np.linalg.norm(ends, axis=1)[:, None]
+    return np.asarray(np.einsum("nik,ik->ni", point[:, None] - base, normal).min(axis=1))
+
+
+def _points(base: Array, centre: Array, disc: Array, size: float) -> tuple[Array, Array]:
+    """Free points, in a triangular grid and on the sides, and held ones on the rims."""
+    low, high = base.min(axis=0) - size, base.max(axis=0) + size
+    x, y = np.meshgrid(
+        np.arange(low[0], high[0], size), np.arange(low[1], high[1], size * np.sqrt(0.75))
+    )
+    x = x + 0.5 * size * (np.arange(len(x)) % 2)[:, None]
+    grid = np.column_stack([x.ravel(), y.ravel()])
+    free = [grid[(_inside(grid, base) > 0.45 * size) & (_gap(grid, centre, disc) > 0.55 * size)]]
+    held = []
+    for middle, radius in zip(centre, disc, strict=True):
+        count = max(int(np.ceil(2.0 * np.pi * radius / (0.7 * size))), 24)
+        turn = 2.0 * np.pi * (np.arange(count) + 0.5) / count
+        held.append(middle + radius * np.column_stack([np.cos(turn), np.sin(turn)]))
+    held = [one[_inside(one, base) > 0.2 * size] for one in held]
+    for start, end in zip(base, np.roll(base, -1, axis=0), strict=True):
+        length = float(np.linalg.norm(end - start))
+        along = (end - start) / length
+        foot = (centre - start) @ along
+        away = np.linalg.norm(centre - start - foot[:, None] * along, axis=1)
+        half = np.sqrt(np.maximum(disc**2 - away**2, 0.0))
+        cuts = np.concatenate([foot - half, foot + half])[np.tile(disc > away, 2)]
+        cuts = cuts[(cuts > 0) & (cuts < length)]
+        even = length * np.linspace(0, 1, max(int(np.ceil(length / size)), 2) + 1)
+        near = np.abs(even[:, None] - cuts).min(axis=1) if len(cuts) else np.full(len(even), 9e9)
+        side = start + even[near > 0.5 * size, None] * along
+        free.append(side[_gap(side, centre, disc) > 0.5 * size])
+        held.append(start + cuts[:, None] * along)
+    rim = np.concatenate(held)
+    return np.concatenate(free), rim[_gap(rim, centre, disc) > -1e-9 * np.ptp(base)]
+
+
+# ------------------------------------------------------------------------------------------------
+# Sections that side walls hold, by finite differences.
+
+
+@cache
+def resolved_beside_walls(place: Any, disc: Any, cells: int = 200, *, edge: bool = False) -> float:
+    """Flux m4 in a trapezoid: w = 0 on the wall and on two discs, no shear on the other sides.
+
+    `place` and `disc` as in `wall_flux`. With `edge` a second wall stands where the second disc
+    would be, and the trapezoid is a rectangle.
+    """
+    step = place[2] / cells
+    x, y = np.meshgrid(
+        (np.arange(cells) + 0.5) * step, np.arange(step / 2, max(place[:2]), step), indexing="ij"
+    )
+    first = x**2 + (y - place[0]) ** 2 < disc[0] ** 2
+    solid = first | ((x - place[2]) ** 2 + (y - place[1]) ** 2 < disc[1] ** 2)
+    inside = y < place[0] + (place[1] - place[0]) * x / place[2]
+    fluid, held = np.pad(inside & ~solid, 1), np.pad(inside & solid, 1)
+    held[:, 0] = True
+    held[-1] |= edge
+    index = np.full(fluid.shape, -1)
+    index[fluid] = np.arange(fluid.sum())
+    own, rows, columns = np.zeros(fluid.sum()), [], []
+    x, y = np.nonzero(fluid)
+    for axis, shift in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        neighbour = np.roll(index, shift, axis=axis)[fluid]
+        at_wall = y == 1 if axis == 1 else edge & (x == cells)
+        half = at_wall & ((axis, shift) in ((1, 1), (0, -1)))
+        own += (neighbour >= 0) + np.roll(held, shift, axis=axis)[fluid] * np.where(half, 2.0, 1.0)
+        rows.append(np.flatnonzero(neighbour >= 0))
+        columns.append(neighbour[neighbour >= 0])
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    shape = (len(own),) * 2
+    system = sparse.coo_matrix((-np.ones(len(row)), (row, column)), shape=shape).tolil()
+    system.setdiag(own)
+    return float(spsolve(system.tocsc(), np.full(len(own), step**2)).sum() * step**2)
