@@ -36,7 +36,7 @@ from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import Scales, invasion_scales, scales_of
 from fdnet.spheres.dump import COLUMNS, read_dump, read_frame
 from fdnet.spheres.geometry import touching_pairs
-from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
+from fdnet.spheres.snapshot import Kind, Snapshot, resting
 from validation.study import FOLDER, Point
 
 TEMPLATES = Path(__file__).with_name("templates")
@@ -64,7 +64,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     elif system == "four collisions":
         found = _worst_collision(folder, value)
     elif system == "undamped pack":
-        found = energy(folder, factor=value, seed=int(point.seed), spans=SPANS)
+        found = thrown_pack(folder, factor=value, seed=int(point.seed), spans=SPANS)
     else:
         scheme = str(point.settings.get("scheme", "every step"))
         found = _fall(folder, scheme, value, int(point.settings.get("looks", 0)))
@@ -184,11 +184,14 @@ def _worst_collision(folder: Path, factor: float) -> dict[str, float]:
         collision(folder / f"{phase}", stiffness=1e4, factor=factor, phase=phase)
         for phase in (0.125, 0.375, 0.625, 0.875)
     ]
-    worst = {name: max(abs(run[name]) for run in runs) for name in ("overlap_error", "restitution_error")}
+    worst = {
+        name: max(abs(run[name]) for run in runs)
+        for name in ("overlap_error", "restitution_error")
+    }
     return worst | {"steps": runs[0]["steps"]}
 
 
-def energy(
+def thrown_pack(
     folder: Path, *, factor: float, seed: int, spans: float, damping: float = 0.0
 ) -> dict[str, float]:
     """A pack at porosity 0.30 between walls, thrown about: E is kinetic and spring energy.
@@ -284,7 +287,11 @@ def _fall(folder: Path, scheme: str, interval: float, looks: int) -> dict[str, f
     counts = {max(least, round(time / interval)) for least, time in enumerate(LOOKS[:looks], 1)}
     errors = [
         _fallen(
-            folder / f"{n}", *keys, over_tau=interval, spans=n * interval, chunk=1.001 * n * interval
+            folder / f"{n}",
+            *keys,
+            over_tau=interval,
+            spans=n * interval,
+            chunk=1.001 * n * interval,
         )[0]
         for n in sorted(counts)
     ]

@@ -28,10 +28,11 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import pandas as pd
 import tomli_w
@@ -49,6 +50,7 @@ NAMES = ("stiffness", "time-step", "drag", "flow-updates", "specimen-size", "siz
          "velocity-field", "linear-solver")  # fmt: skip
 SWEEP = ("name", "case", "cases", "seeds", "set", "grid", "variants")
 POINTS = "points.jsonl"
+Result = TypeVar("Result")
 LONGEST_S, MOST_BYTES = 300.0, 16 * 2**30
 """Limits of an isolated point."""
 
@@ -177,6 +179,21 @@ def measure_point(study: Study, point: Point, work: Path) -> dict[str, Any]:
         found, status = {}, "over memory"
     costs = {"core_s": _processors() - before, "rss_mb": peak_memory() / 1e6, "steps": None}
     return {**costs, **found, "status": status}
+
+
+def least_time(work: Callable[[], Result], *, times: int = 3) -> tuple[Result, float]:
+    """What `work` returns, and the core seconds of the quickest of `times` runs.
+
+    The first run may compile or load. There are only two runs when they take more than a second,
+    and only one when it takes more than ten.
+    """
+    took: list[float] = []
+    while True:
+        start = time.process_time()
+        result = work()
+        took.append(time.process_time() - start)
+        if len(took) == times or sum(took) > (1.0 if len(took) > 1 else 10.0):
+            return result, min(took)
 
 
 def _processors() -> float:

@@ -27,9 +27,7 @@ from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.networks import network_of
 from tests.network.packs import body_centred, random_pack, simple_cubic, snapshot, with_fines
 from tests.network.sections import from_python, uneven_flux, wall_flux
-from validation.engine.csv_rows import read_named
-from validation.truth.packs import MM
-from validation.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
+from validation import truth
 
 ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
 PACKS = {
@@ -71,19 +69,17 @@ def test_a_body_centred_throat_by_the_formulas_on_paper():
 
 def test_thin_slabs_of_grains_against_stokes():
     """Planes that cut caps off grains."""
-    rows = {row["slab"]: row for row in read_named(SLAB_FOLDER / SLAB_TRUTH)}
-    for name, error in [
-        ("slabM_r5_ranges_cake", 0.07),
-        ("slabL_r10", 0.09),
-        ("slabE_r3", 0.05),
-        ("slabQ_r5_mu0_light", 0.03),
-    ]:
-        row = rows[name]
-        span = float(row["x_lo_mm"]) * MM, float(row["x_hi_mm"]) * MM
-        grains = read_specimen(SLAB_FOLDER / row["file"]).grains()
-        network = build_network(cut_out(grains, span, SIDES), periodic=SIDES)
+    bounds = {
+        "slabM_r5_ranges_cake": 0.07,
+        "slabL_r10": 0.09,
+        "slabE_r3": 0.05,
+        "slabQ_r5_mu0_light": 0.03,
+    }
+    for slab in truth.slabs(list(bounds)):
+        grains = truth.read_pack(slab.specimen).grains()
+        network = build_network(cut_out(grains, slab.planes, SIDES), periodic=SIDES)
         k = whole_permeability(network, 1.0 / half_resistances(network).sum(axis=1))[0]
-        assert k == pytest.approx(float(row["k0_mm2"]) * MM**2, rel=error), name
+        assert k == pytest.approx(slab.k0, rel=bounds[slab.name]), slab.name
 
 
 def test_the_cap_of_a_grain_that_a_face_cuts():

@@ -12,13 +12,15 @@ from fdnet.errors import CaseError, FlowError
 from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import scales_of
 from tests.network.exact import exact_balance, random_links
-from validation import study
-from validation.dem.closed import deepest_overlap_of, restitution_of
-from validation.dem.collisions import SPEED
-from validation.dem.runs import slab_case
-from validation.dem.small_systems import measure
-from validation.network import laws, linear_solver, velocity_field
-from validation.network.linear_solver import Circuit, circuit_of, exact_fluxes, solve_by
+from validation import laws, linear_solver, study, velocity_field
+from validation.linear_solver import Circuit, circuit_of, exact_fluxes, solve_by
+from validation.small_systems import (
+    SPEED,
+    deepest_overlap_of,
+    measure,
+    restitution_of,
+    slab_case,
+)
 
 
 def found(work: Path, values, measure=measure, *, knob="k", seed=1, **settings) -> dict:
@@ -141,7 +143,7 @@ def test_errors_of_the_velocity_fall_with_the_cells_and_points_lie_in_the_pores(
     result = found(tmp_path, (5.0, 7.0), **pack)
     for name in ("velocity", "throat fluxes"):
         assert 0.0 < result[7.0][name] < 0.7 * result[5.0][name]
-    lattice = laws.truth_cases()["SC c = 0.216"].pack
+    lattice = laws.known_case("SC c = 0.216").pack
     place = velocity_field.pore_points(lattice, 4000, 1)
     assert len(place) / 4000 == pytest.approx(1.0 - 0.216, abs=0.02)  # 3 sigma
 
@@ -159,7 +161,7 @@ def test_laws_have_the_errors_of_the_table_of_accuracy_and_resolved_flow_converg
             column = value if "+" in value else f"{value}: k0"
             over = law[value][name] / law["truth"][name]
             assert over == pytest.approx(float(known[pack][column]), abs=2e-4), (pack, value)
-    truth = laws.truth_cases()["H_40_eps40"].k
+    truth = laws.known_case("H_40_eps40").k
     grids = found(tmp_path, (16.0, 24.0), laws.measure, knob="cells", seed="H_40_eps40")
     two = laws.measure(study.Point("s", "cells", 24.0, "H_40_eps40", {"coarser": 2 / 3}), tmp_path)
     one = {cells: grid["k"] / truth - 1 for cells, grid in grids.items()}

@@ -118,33 +118,3 @@ def test_a_stopped_study_goes_on_where_it_was(tmp_path):
         assert read_state(one).damaged.position.tobytes() == (
             read_state(other).damaged.position.tobytes()
         )
-
-
-@pytest.mark.parametrize("sign", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
-def test_a_stopped_study_of_a_choice_leaves_no_process(root, tmp_path, sign):
-    """Also while a point computes in a process of its own that hears no signal at once."""
-    (tmp_path / "driver.py").write_text(
-        "import sys\n"
-        f"sys.path[:0] = [{str(root / 'tests')!r}, {str(root)!r}]\n"
-        "from pathlib import Path\n"
-        "import toy_points\n"
-        "from validation.engine.runner import run_points\n"
-        "if __name__ == '__main__':\n"
-        "    run_points(toy_points.endless(), Path('out'), quick=False)\n"
-    )
-    (tmp_path / "toy_points.py").write_text(
-        "from studies.toy_study import toy\n"
-        "def measure(point, work):\n"
-        "    (work / 'begun').touch()\n"
-        "    while True:\n"
-        "        pass\n"
-        "def endless():\n"
-        "    return toy(measure=measure, isolated=True, seconds=1e3)\n"
-    )
-    code, _ = stop(
-        [sys.executable, "driver.py"],
-        lambda: (tmp_path / "out" / "work" / "begun").exists(),
-        sign,
-        cwd=tmp_path,
-    )
-    assert code != 0

@@ -11,8 +11,8 @@ from fdnet.network.field.field import VelocityField, velocity_field
 from fdnet.network.network import Network, build_network
 from fdnet.spheres.geometry import make_images
 from fdnet.spheres.snapshot import Array, Snapshot
-from validation.network.packs import least_time, truth_pack
-from validation.study import Point
+from validation.study import Point, least_time
+from validation.truth import read_pack
 
 PACKS = {
     "C, porosity 0.40": "packC_80_eps40",
@@ -29,7 +29,7 @@ PARTS = 12
 def measure(point: Point, work: Path) -> Mapping[str, float]:
     """Rms error of the velocity over the mean speed, 1 - R2 of the fluxes, and the seconds."""
     name, fine = PACKS[str(point.settings["pack"])], float(point.settings["fine"])
-    pack, cells = truth_pack(name), float(point.value)
+    pack, cells = read_pack(name), float(point.value)
     places, throats = pore_points(pack, POINTS, SEED), build_network(pack.grains(), periodic="xyz")
     expected, fluxes = _reference(name, fine, work)
     velocity_field(pack, periodic="xyz", cells=COARSEST)  # compiles
@@ -80,7 +80,7 @@ def _reference(name: str, cells: float, work: Path) -> tuple[Array, Array]:
     """Velocity at the points of the pack, and fluxes of its throats, on the fine grid."""
     kept = work / f"{name}-{cells:g}.npz"
     if not kept.exists():
-        pack = truth_pack(name)
+        pack = read_pack(name)
         field = velocity_field(pack, periodic="xyz", cells=cells, tolerance=0.02)
         network = build_network(pack.grains(), periodic="xyz")
         velocity = field.at(pore_points(pack, POINTS, SEED))

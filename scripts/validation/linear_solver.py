@@ -28,8 +28,8 @@ from fdnet.network.flow.solver import (
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.spheres.snapshot import Array, Snapshot, resting
-from validation.network.packs import least_time, truth_pack
-from validation.study import Point
+from validation.study import Point, least_time
+from validation.truth import read_pack
 
 FDNET, DIRECT, SPSOLVE = "fdnet", "METIS + splu", "spsolve"
 RUGE_STUBEN, JACOBI = "CG + Ruge-Stuben", "CG + Jacobi"
@@ -136,7 +136,7 @@ def intact_circuit(pores: int) -> Circuit:
 
     Pores that no open path joins to a plane are left out.
     """
-    pack = truth_pack(TILE)
+    pack = read_pack(TILE)
     tiles = pores / PORES_PER_GRAIN / len(pack)
     across = max(round(tiles ** (1.0 / 3.0)), 1)
     grains = _tiled(pack, np.array([max(round(tiles / across**2), 1), across, across]))
