@@ -20,9 +20,7 @@ from pathlib import Path
 
 import fdnet
 from fdnet.network.permeability import Analysis
-from validation.engine.csv_rows import read_named
-from validation.truth.packs import read_pack, truth_folder
-from validation.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
+from validation.truth import read_pack, slabs
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "tests/data/frozen.json"
@@ -100,14 +98,12 @@ def runs(into: Path) -> Iterator[tuple[str, str]]:
 def permeabilities() -> Iterator[tuple[str, str]]:
     """Permeability without and with fines, m2, at full digits, by each pair of laws."""
     for name in PACKS:
-        spheres, _ = read_pack(truth_folder() / f"pack{name}.csv")
+        spheres = read_pack(f"pack{name}")
         yield from _by_law(f"pack{name}", fdnet.compare(spheres, periodic="xyz"))
-    for row in read_named(SLAB_FOLDER / SLAB_TRUTH):
-        if row["slab"] in SLABS:
-            spheres = read_specimen(SLAB_FOLDER / row["file"])
-            planes = [1e-3 * float(row["x_lo_mm"]), 1e-3 * float(row["x_hi_mm"])]
-            edges = sorted({*map(float, spheres.box[0]), *planes})
-            yield from _by_law(row["slab"], fdnet.compare(spheres, periodic="yz", sections=edges))
+    for slab in slabs(SLABS):
+        spheres = read_pack(slab.specimen)
+        edges = sorted({*map(float, spheres.box[0]), *slab.planes})
+        yield from _by_law(slab.name, fdnet.compare(spheres, periodic="yz", sections=edges))
 
 
 def _by_law(name: str, results: Iterable[Analysis]) -> Iterator[tuple[str, str]]:

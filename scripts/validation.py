@@ -14,6 +14,9 @@ from importlib import import_module
 from fdnet.errors import FdnetError
 
 CHAPTERS: dict[str, str] = {
+    "accuracy": "validation.accuracy",
+    "benchmark": "validation.benchmark",
+    "truth": "validation.truth_solved",
     "outside": "validation.outside",
     "mechanics": "validation.mechanics",
     "bridging": "validation.bridging",
@@ -23,7 +26,7 @@ CHAPTERS: dict[str, str] = {
 
 All other names are studies of error against run time.
 """
-STUDIES = "validation.command"
+STUDIES = "validation.study"
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import re
 import subprocess
 import sys
@@ -65,7 +66,7 @@ def test_a_velocity_of_no_well_and_a_finest_tenth_that_takes_the_time_are_named(
 def test_the_errors_by_width_are_those_of_the_study(root):
     """The means of `specimen-size.csv` over the seeds of each cube."""
 
-    path = root / "docs/validation/specimen-size.csv"
+    path = root / "docs/evidence/error_against_time/specimen-size.csv"
     rows = [
         row
         for row in csv.DictReader(path.open(encoding="utf-8"))
@@ -73,7 +74,8 @@ def test_the_errors_by_width_are_those_of_the_study(root):
     ]
     by_width: dict[tuple[str, float], list[float]] = {}
     for row in rows:
-        width = float(row["run"].split("size_mm=")[1].split(",")[0]) / 0.5
+        edge = (float(row["value"]) * 4 / 3 * math.pi * 0.25**3 / 0.6) ** (1 / 3)
+        width = round(4 * edge) / 4 / 0.5  # the cubes have edges in whole quarters of 1 mm
         by_width.setdefault((row["series"], width), []).append(float(row["observed"]))
     bulk = by_width["intact, periodic sides", 16.0]
     for series, errors in (

@@ -362,6 +362,8 @@ class Execution:
         seconds: s, from start to end.
         ranks: MPI ranks.
         waited: s of them, in which LIGGGHTS waited for fdnet to compute something.
+        cpu_seconds: s of processors, user and system, of LIGGGHTS on all ranks.
+        peak_memory_bytes: largest resident memory of LIGGGHTS; None on several ranks.
     """
 
     directory: Path
@@ -370,6 +372,8 @@ class Execution:
     seconds: float
     ranks: int
     waited: float = 0.0
+    cpu_seconds: float = 0.0
+    peak_memory_bytes: int | None = None
 
 
 class _EndedError(Exception):
@@ -388,6 +392,8 @@ class Feed:
         deadline: s of the monotonic clock; None: no limit.
         busy: s, that it has worked on the commands.
         waited: s, in between.
+        usage: what the process and its children used, known when it has ended.
+        peak_memory_bytes: largest resident memory of the process so far.
     """
 
     process: subprocess.Popen
@@ -397,6 +403,8 @@ class Feed:
     deadline: float | None
     busy: float = 0.0
     waited: float = 0.0
+    usage: resource.struct_rusage | None = None
+    peak_memory_bytes: int = 0
     _fed: int = 0
     _rest: bytes = b""
 
@@ -430,7 +438,7 @@ class Feed:
             while True:
                 self._lines()
         except _EndedError:
-            while self.process.poll() is None:  # it may close its output before
+            while not self._ended():  # it may close its output before
                 self._refuse()
                 time.sleep(0.02)
 
@@ -452,8 +460,9 @@ class Feed:
         pipe = self.process.stdout.fileno()
         while not select.select([pipe], [], [], _PATIENCE)[0]:
             self._refuse()
-            if self.process.poll() is not None:  # a daemon of MPI may keep the pipe open
+            if self._ended():  # a daemon of MPI may keep the pipe open
                 raise _EndedError
+        self.peak_memory_bytes = max(self.peak_memory_bytes, peak_memory(self.process.pid))
         part = os.read(pipe, _PART)
         try:
             self.screen.write(part)
@@ -477,6 +486,15 @@ class Feed:
             raise _EndedError
         return lines
 
+    def _ended(self) -> bool:
+        """Whether the process has ended; the kernel then says once what it used."""
+        if self.process.returncode is None:
+            pid, status, usage = os.wait4(self.process.pid, os.WNOHANG)
+            if pid:
+                self.process.returncode = os.waitstatus_to_exitcode(status)
+                self.usage = usage
+        return self.process.returncode is not None
+
     def _refuse_late(self) -> None:
         if self.deadline is not None and time.monotonic() > self.deadline:
             raise LiggghtsError(
@@ -494,6 +512,18 @@ class Feed:
                     f"{path.name} and was stopped: it repeats a message without end; read the "
                     "beginning of the file, then mend the cause and continue with --resume"
                 )
+
+
+def peak_memory(process: int | str = "self") -> int:
+    """Largest resident memory, bytes, of a process since its program began; 0 if unknown.
+
+    That of getrusage also counts what a process had as a copy of its parent.
+    """
+    try:
+        lines = Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return 0
+    return next((1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM")), 0)
 
 
 def run_deck(
@@ -531,4 +561,6 @@ def run_deck(
         seconds=time.monotonic() - start,
         ranks=launch.ranks,
         waited=feed.waited,
+        cpu_seconds=feed.usage.ru_utime + feed.usage.ru_stime if feed.usage else 0.0,
+        peak_memory_bytes=feed.peak_memory_bytes if launch.ranks == 1 else None,
     )

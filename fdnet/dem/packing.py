@@ -235,6 +235,7 @@ def make_pack(case: Case, folder: Path, launch: Launch) -> Pack:
                 "max_overlap": pack.max_overlap,
                 "restless": pack.restless,
                 "liggghts_s": pack.run.seconds,
+                "liggghts_cpu_s": pack.run.cpu_seconds,
             }
         )
         _refuse_overlap(case, pack)

@@ -47,6 +47,7 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
         "format": RECORD_FORMAT,
         "digest": start.digest,
         "seconds": session.seconds[STAGE],
+        "cpu_seconds": session.cpu_seconds[STAGE],
         "stop_reason": result.stop_reason,
         "out": last.out,
         "max_overlap": overlap_in(case, result.state).fraction,

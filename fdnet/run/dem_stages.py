@@ -41,9 +41,8 @@ def pack_stage(session: Session) -> None:
     with session.timed("pack"), progress:
         pack = make_pack(case, folder, session.launch(progress))
     seconds, assumed = session.seconds["pack"], session.scales.porosity
-    session.folder.finish(
-        "pack", pack_record(case, pack, folder, assumed=assumed, seconds=seconds)
-    )
+    record = pack_record(case, pack, folder, assumed=assumed, seconds=seconds)
+    session.folder.finish("pack", record | {"cpu_seconds": session.cpu_seconds["pack"]})
 
 
 def invade_stage(session: Session, case: InvasionCase) -> None:
@@ -64,7 +63,7 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
         launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
         result = invade(case, scales, grains, folder, launch, fluid=fluid)
     record = invade_record(case, result, folder, seconds=session.seconds["invade"])
-    session.folder.finish("invade", record)
+    session.folder.finish("invade", record | {"cpu_seconds": session.cpu_seconds["invade"]})
 
 
 def is_done(session: Session, stage: str) -> bool:

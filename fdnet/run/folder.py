@@ -138,12 +138,15 @@ class _Execution(JsonObject):
     version: str
     seconds: float
     waited: float = 0.0
+    cpu_seconds: float = 0.0
+    peak_memory_bytes: int | None = None
 
 
 class _Attempt(JsonObject):
     """One attempt at the porosity of a pack."""
 
     liggghts_s: float
+    liggghts_cpu_s: float = 0.0
 
 
 class _Updates(JsonObject):
@@ -160,6 +163,7 @@ class StageRecord(JsonObject):
     format: Literal[1]
     digest: str
     seconds: float
+    cpu_seconds: float = 0.0
     max_overlap: float
     steps: int
     dt_s: float

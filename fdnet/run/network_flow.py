@@ -79,7 +79,7 @@ STAGNANT = 1e-2
 """A pore that carries less than this share of the mean flux of a pore, clean, keeps ratio 1."""
 RENEWED = 0.2
 """Share of the deposit by volume that may change before the network is solved anew
-(docs/validation/solve_lag.csv, docs/validation/flow-updates.md)."""
+(docs/validation/solve_lag.csv, docs/evidence/error_against_time.md)."""
 STEP = 1.0 / 3.0
 """Greatest step between two sections of a throat, in radii of its smallest fine. The analysis
 takes an eighth (docs/validation/solve_lag.csv)."""
@@ -89,7 +89,7 @@ LEAK = 1e-6
 """Share of its clean conductance that a side keeps at least, so that pressures are known beyond
 what the fines close."""
 CELLS, SLIP = 10.0, 0.15
-"""Cells of the resolved field across a grain (docs/validation/velocity-field.md), and the rms
+"""Cells of the resolved field across a grain (docs/evidence/error_against_time.md), and the rms
 velocity over the superficial one that it leaves at the walls (docs/velocity_field.md)."""
 
 

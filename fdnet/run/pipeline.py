@@ -50,6 +50,7 @@ from fdnet.run.records import (
     Session,
     cores,
     record_warnings,
+    stage_costs,
     stage_seconds,
     versions,
 )
@@ -282,6 +283,8 @@ def _analyse_and_report(session: Session, pack: dict[str, Any]) -> dict[str, Any
         results = with_added(_analysed(session, (invasion or {}).get("supplied", 0)), cleaned)
         write_tables(results)
     summary = _summary(session, results, pack, invasion if results.invasion else None, cleaned)
+    stages = (pack, invasion, cleaned)
+    summary |= stage_costs(stages, session.cpu_seconds)
     summary = tables.write_summary(session.path / "summary.json", summary)
     session.options.answered(summary)
     if "report" in session.options.stages:
@@ -290,6 +293,7 @@ def _analyse_and_report(session: Session, pack: dict[str, Any]) -> dict[str, Any
             figures, notes = draw_figures(results)
         summary["warnings"] += [explained(note) for note in notes]
         summary["seconds"] |= {"report": session.seconds["report"]}
+        summary |= stage_costs(stages, session.cpu_seconds)
         tables.write_summary(session.path / "summary.json", summary)
         _write_page(session, results, summary, figures, versions(pack))
     return summary

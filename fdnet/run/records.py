@@ -18,7 +18,14 @@ from typing import Any
 from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.checkpoint import HISTORY, UPDATES, WATCH, Checkpoint, Deepest, overlap_text
 from fdnet.dem.invasion import Invasion
-from fdnet.dem.liggghts import KNOWN_VERSION, Binary, Execution, Launch, find_binary
+from fdnet.dem.liggghts import (
+    KNOWN_VERSION,
+    Binary,
+    Execution,
+    Launch,
+    find_binary,
+    peak_memory,
+)
 from fdnet.dem.packing import Pack
 from fdnet.errors import CaseError, Doubt, explained
 from fdnet.names import STAGES
@@ -118,6 +125,8 @@ def run_record(run: Execution) -> dict[str, Any]:
         "version": run.version,
         "seconds": run.seconds,
         **({"waited": run.waited} if run.waited else {}),
+        "cpu_seconds": run.cpu_seconds,
+        "peak_memory_bytes": run.peak_memory_bytes,
         "ranks": run.ranks,
         "deck_sha256": decks,
     }
@@ -198,6 +207,32 @@ def stage_seconds(
         + sum(row["liggghts_s"] for row in pack["attempts"][:-1])
         - waited,
         **({"updates": waited} if waited else {}),
+    }
+
+
+def stage_costs(
+    stages: Sequence[dict[str, Any] | None], own: Mapping[str, float]
+) -> dict[str, dict[str, Any]]:
+    """Keys of the summary: processor seconds and peak memory of LIGGGHTS and of fdnet itself.
+
+    `stages` are the records of those that run LIGGGHTS; `own` are fdnet's processor seconds in
+    this session. The memory of fdnet is that of this session, of LIGGGHTS that of its largest run.
+    """
+    done = [record for record in stages if record]
+    runs = [run for record in done for run in record["runs"]]
+    earlier = [row for record in done for row in record.get("attempts", [])[:-1]]
+    peaks = [run.get("peak_memory_bytes") for run in runs]
+    return {
+        "cpu_seconds": {
+            "liggghts": sum(run.get("cpu_seconds", 0.0) for run in runs)
+            + sum(row.get("liggghts_cpu_s", 0.0) for row in earlier),
+            "python": sum(record.get("cpu_seconds", 0.0) for record in done)
+            + sum(own.get(stage, 0.0) for stage in ("analyse", "report")),
+        },
+        "peak_memory_bytes": {
+            "liggghts": None if None in peaks else max(peaks, default=0),
+            "python": peak_memory(),
+        },
     }
 
 
@@ -303,6 +338,7 @@ class Session:
         folder: where it is run; this process holds its lock.
         options: how it is run.
         seconds: s, that each stage took in this session.
+        cpu_seconds: s of processors, that this process spent on each of them.
     """
 
     case: Case
@@ -310,6 +346,7 @@ class Session:
     folder: RunFolder
     options: RunOptions
     seconds: dict[str, float] = field(default_factory=dict)
+    cpu_seconds: dict[str, float] = field(default_factory=dict)
     _binary: Binary | None = None
 
     @property
@@ -336,9 +373,11 @@ class Session:
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
         """Add the time inside the `with` block to the seconds of the stage."""
-        start = time.monotonic()
+        start, cpu = time.monotonic(), time.process_time()
         yield
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.monotonic() - start
+        used = time.process_time() - cpu
+        self.cpu_seconds[stage] = self.cpu_seconds.get(stage, 0.0) + used
 
 
 # ------------------------------------------------------------------------------------------------
@@ -372,11 +411,13 @@ def take_pack(session: Session, source: Path) -> None:
             ignore=shutil.ignore_patterns(LOCK, Path(RECORDS["pack"]).name),
             dirs_exist_ok=True,
         )
+    nothing = ("liggghts_s", "liggghts_cpu_s")
     own = {
         "seconds": session.seconds["pack"],
+        "cpu_seconds": session.cpu_seconds["pack"],
         "taken_from": str(source),
         "made_in_seconds": record["seconds"],
-        "runs": [row | {"seconds": 0.0} for row in record["runs"]],
-        "attempts": [row | {"liggghts_s": 0.0} for row in record["attempts"]],
+        "runs": [row | {"seconds": 0.0, "cpu_seconds": 0.0} for row in record["runs"]],
+        "attempts": [row | dict.fromkeys(nothing, 0.0) for row in record["attempts"]],
     }
     session.folder.finish("pack", record | own)

@@ -50,7 +50,7 @@ class Finding:
 # ------------------------------------------------------------------------------------------------
 # By how much a specimen shows another permeability than the bulk, because it is narrow.
 #
-# The values are those of the study `specimen-size` (docs/validation/specimen-size.md): cubes of
+# The values are those of the study `specimen-size` (docs/evidence/error_against_time.md): cubes of
 # equal grains at a porosity of 0.40, the mean of 5 or 10 packs, against cubes of 16 grains with
 # periodic sides.
 
@@ -108,7 +108,7 @@ def findings(case: Case, scales: Scales) -> Iterator[Finding]:
             "the ratio of damaged to intact suffers less",
             do=f"take {sides}a width of {1e3 * wider * mean:.2g} mm for less than "
             f"{100 * MOST_WIDTH_ERROR:.0f} %, or use the ratio only",
-            read="docs/validation/specimen-size.md",
+            read="docs/evidence/error_against_time.md",
         )
     diameter, count = 2 * case.grains.mean_radius_m, case.analysis.sections
     assert isinstance(count, int)

@@ -539,7 +539,7 @@ def cohesion_warnings(case: InvasionCase, contact: Contact) -> list[Doubt]:
 
 MOST_FALSE_FORCE = 0.5
 """False force of the integrator over the push of the fluid, up to which no fine was seen to be
-held by it (docs/validation.md, section 7)."""
+held by it (docs/evidence/error_against_time.md)."""
 _ROUNDING = 1 + 1e-9
 
 

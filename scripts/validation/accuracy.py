@@ -1,34 +1,34 @@
-"""How far the permeability by each law is from resolved Stokes flow: rows, tables and figure.
+"""How far the permeability by each law is from resolved Stokes flow: the chapter `accuracy`.
 
-Packs are periodic cubes, with fines at random places on the grains or without fines. Slabs are cut
-out of specimens that LIGGGHTS packed and invaded. Rows hold model over truth, so that 1 is right.
-Where the damage law "auto" is meant, the rows are those of "all-spheres", which it takes here.
+Rows hold model over truth, so that 1 is right. Packs are periodic cubes, with fines at random
+places on the grains or without fines; slabs are cut out of specimens that LIGGGHTS packed and
+invaded (`validation.truth`). A pair is a law of the throats and a law of the damage; where the
+damage law "auto" is meant, the rows are those of "all-spheres", which it takes here.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import argparse
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
+import pandas as pd
 
-from fdnet.files import replacing
+from fdnet.files import path_option, replacing
 from fdnet.names import ALL_SPHERES, DEFAULT_LAW, SECTION_ARCHIE
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import Section, whole_permeability
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.network import Network, build_network
-from fdnet.network.permeability import Analysis, compare
+from fdnet.network.permeability import compare
 from fdnet.network.states import FEW_THROATS, all_conductances, cut_out
 from fdnet.run.finished import open_run
-from fdnet.spheres.snapshot import Array, Snapshot
-from validation.engine.csv_rows import DIGITS, read_named, write_named
-from validation.engine.markdown import markdown_table
-from validation.engine.palette import BLUE, GREEN, NEARLY_BLACK, ORANGE, RED
-from validation.truth.cases import EQUAL, LATER, LATTICE, LOOSE, UNEQUAL, Case, read_cases
-from validation.truth.made_packs import made_deposit
-from validation.truth.packs import DATA, LARGE_FINES_TRUTH, MM, RADIUS, truth_tables
-from validation.truth.slabs import SLAB_FOLDER, SLAB_TRUTH, read_specimen
+from fdnet.run.stokes_sections import ACROSS_A_FINE, stokes_sections
+from fdnet.spheres.snapshot import Snapshot
+from validation import truth
+from validation.truth import Case, Slab
 
 Row = dict[str, Any]
 ARCHIE, FINEST = f"{DEFAULT_LAW} + {SECTION_ARCHIE}", f"{DEFAULT_LAW} + {ALL_SPHERES}"
@@ -36,25 +36,21 @@ PAIRS = ("thesis + thesis", "thesis + thesis-code", ARCHIE)
 """The pairs of a conductance law and a damage law of the throats between grains."""
 ALL_PAIRS = (*PAIRS, FINEST)
 """These, and the network of all spheres."""
-PACKS, SLABS, FULL_SIZE = "accuracy_packs.csv", "accuracy_slabs.csv", "accuracy_full_size.csv"
+FOLDER = Path(__file__).resolve().parents[2] / "docs" / "validation"
+PACKS, SLABS, FIGURE = "accuracy_packs.csv", "accuracy_slabs.csv", "accuracy.png"
+SECTIONS = "stokes_sections.csv"
 THROATS = "throats"
 """Number of throats that carry the flow through grains and fines (`Flow.carrying_throats`)."""
 FINE_CLASSES = {"3 to 4": (0.0, 4.5), "5 to 6": (4.5, 7.0), "8 to 10": (7.0, np.inf)}
 """Size ratio D/d, the mean radius of the grains over that of the fines."""
-EDGES_MM = (0.0, 0.5, 1.0, 2.0)
-"""Where the sections of runs of full size begin, mm from the face."""
-WHOLE = "whole"
-PERIODIC = (True, True, True)
+LIGHT = 0.9
+"""k/k0 from which on the damage of a slab is light."""
+ALL_AXES = (True, True, True)
 
 
 def network_of(pack: Snapshot) -> Network:
     """The network of the grains of a periodic pack."""
-    return build_network(pack.grains(), periodic=PERIODIC, walls="slip")
-
-
-def permeability(network: Network, conductance: Array) -> float:
-    """k (m2) along x of a network with `conductance` (T,) m3."""
-    return whole_permeability(network, conductance)[0]
+    return build_network(pack.grains(), periodic=ALL_AXES, walls="slip")
 
 
 def law_of(pair: str) -> str:
@@ -64,17 +60,17 @@ def law_of(pair: str) -> str:
 
 def by_law(network: Network, law: str) -> float:
     """k (m2) of the grains by a conductance law."""
-    return permeability(network, LAWS[law](network))
+    return whole_permeability(network, LAWS[law](network))[0]
 
 
 def by_pair(network: Network, occupancy: Occupancy, pair: str) -> float:
     """k (m2) with fines by one of `PAIRS`."""
     law, damage_law = pair.split(" + ")
     damaged = DAMAGE_LAWS[damage_law](network, occupancy, LAWS[law](network))
-    return permeability(network, damaged.conductance)
+    return whole_permeability(network, damaged.conductance)[0]
 
 
-def by_all_spheres(pack: Snapshot, periodic: Any = PERIODIC) -> tuple[float, Flow]:
+def by_all_spheres(pack: Snapshot, periodic: Any = ALL_AXES) -> tuple[float, Flow]:
     """k (m2) by the network of all spheres that runs take, and its flow."""
     network = build_network(pack, periodic=periodic, walls="slip")
     return whole_permeability(network, all_conductances(network))
@@ -85,78 +81,59 @@ def size_ratio(spheres: Snapshot) -> float:
     return float(spheres.grains().radius.mean() / spheres.fines().radius.mean())
 
 
-def pack_rows(cases: Iterable[Case]) -> Iterator[Row]:
-    """k0 of packs without fines by every law; k and k/k0 of packs with fines by `ALL_PAIRS`."""
-    for case in cases:
-        row: Row = {
-            "case": case.name,
-            "group": case.group,
-            "size_ratio": np.nan if case.ratio is None else size_ratio(case.pack),
-            "grains": len(case.pack.grains()),
-            "fines": len(case.pack.fines()),
-            THROATS: np.nan,
-            "k_true_m2": case.k,
-            "truth_error": case.error,
-            "known_before": case.known_before,
-            "k_over_k0": np.nan if case.ratio is None else case.ratio,
-        }
-        network = network_of(case.pack)
-        k0 = {law: by_law(network, law) for law in LAWS}
-        true_k0 = case.k if case.ratio is None else case.k / case.ratio
-        row |= {f"{law}: k0": k0[law] / true_k0 for law in LAWS}
-        k = dict.fromkeys(ALL_PAIRS, np.nan)
-        if case.ratio is not None:
-            occupancy = measure_occupancy(network, case.pack.fines())
-            k = {pair: by_pair(network, occupancy, pair) for pair in PAIRS}
-            k[FINEST], flow = by_all_spheres(case.pack)
-            row[THROATS] = flow.carrying_throats
-        for pair in ALL_PAIRS:
-            row[f"{pair}: k"] = k[pair] / case.k
-            row[pair] = row[f"{pair}: k"] / row[f"{law_of(pair)}: k0"]
-        yield row
+def pack_row(case: Case) -> Row:
+    """k0 of a pack by every law, and with fines k and k/k0 by `ALL_PAIRS`, over the truth."""
+    filled = case.ratio is not None
+    row: Row = {
+        "case": case.name,
+        "group": case.group,
+        "size_ratio": size_ratio(case.pack) if filled else np.nan,
+        "grains": len(case.pack.grains()),
+        "fines": len(case.pack.fines()),
+        THROATS: np.nan,
+        "k_true_m2": case.k,
+        "truth_error": case.error,
+        "known_before": case.known_before,
+        "k_over_k0": case.ratio if filled else np.nan,
+    }
+    network = network_of(case.pack)
+    true_k0 = case.k / case.ratio if case.ratio else case.k
+    row |= {f"{law}: k0": by_law(network, law) / true_k0 for law in LAWS}
+    k = dict.fromkeys(ALL_PAIRS, np.nan)
+    if filled:
+        occupancy = measure_occupancy(network, case.pack.fines())
+        k = {pair: by_pair(network, occupancy, pair) for pair in PAIRS}
+        k[FINEST], flow = by_all_spheres(case.pack)
+        row[THROATS] = flow.carrying_throats
+    for pair in ALL_PAIRS:
+        row[f"{pair}: k"] = k[pair] / case.k
+        row[pair] = row[f"{pair}: k"] / row[f"{law_of(pair)}: k0"]
+    return row
 
 
-def large_fines(folder: Path = DATA) -> Iterator[Case]:
-    """Pack H with fines of a third of a grain, which are made and not stored."""
-    for line in read_named(folder / LARGE_FINES_TRUTH):
-        lost = float(line["case"].rpartition("_d")[2]) / 100.0
-        asked = {"seed": 408, "intact": "packH_40_eps40", "fine": RADIUS / 3.0, "lost": lost}
-        yield Case(
-            name=line["case"].removeprefix("pack"),
-            group=EQUAL,
-            pack=made_deposit(asked, folder)[0],
-            k=float(line["k_mm2"]) * MM**2,
-            error=float(line["relative_error"].rstrip("%")) / 100.0,
-            ratio=float(line["k_over_k0"]),
-        )
+def slab_row(slab: Slab) -> Row:
+    """k0, k and k/k0 of a slab by `ALL_PAIRS`, over the truth.
 
-
-def slab_rows(folder: Path = SLAB_FOLDER) -> Iterator[Row]:
-    """k0, k and k/k0 of every slab in the table of `folder`, by `ALL_PAIRS`.
-
-    The slabs are sections of their specimens, cut out with the pressure held on both planes.
+    A slab is a section of its specimen, cut out with the pressure held on both planes.
     """
-    for line in read_named(folder / SLAB_TRUTH):
-        spheres = read_specimen(folder / line["file"])
-        planes = float(line["x_lo_mm"]) * MM, float(line["x_hi_mm"]) * MM
-        slab = cut_out(spheres, planes, (False, True, True))
-        k0, k = (float(line[f"{name}_mm2"]) * MM**2 for name in ("k0", "k"))
-        row: Row = {
-            "case": line["slab"],
-            "size_ratio": size_ratio(spheres),
-            "grains": len(spheres.grains()),
-            "fines": len(slab.fines()),
-            THROATS: by_all_spheres(slab, "yz")[1].carrying_throats,
-            "k_true_m2": k,
-            "truth_error": float(line["relative_error"].rstrip("%")) / 100.0,
-            "known_before": line["known_before"],
-            "k_over_k0": float(line["k_over_k0"]),
-        }
-        for pair, section in zip(ALL_PAIRS, _sections(spheres, planes), strict=True):
-            row[f"{law_of(pair)}: k0"] = section.k_initial / k0
-            row[f"{pair}: k"] = section.k_damaged / k
-            row[pair] = section.k_damaged / section.k_initial / row["k_over_k0"]
-        yield row
+    spheres = truth.read_pack(slab.specimen)
+    part = cut_out(spheres, slab.planes, (False, True, True))
+    row: Row = {
+        "case": slab.name,
+        "size_ratio": size_ratio(spheres),
+        "grains": len(spheres.grains()),
+        "fines": len(part.fines()),
+        THROATS: by_all_spheres(part, "yz")[1].carrying_throats,
+        "k_true_m2": slab.k,
+        "truth_error": slab.error,
+        "known_before": slab.known_before,
+        "k_over_k0": slab.ratio,
+    }
+    for pair, section in zip(ALL_PAIRS, _sections(spheres, slab.planes), strict=True):
+        row[f"{law_of(pair)}: k0"] = section.k_initial / slab.k0
+        row[f"{pair}: k"] = section.k_damaged / slab.k
+        row[pair] = section.k_damaged / section.k_initial / slab.ratio
+    return row
 
 
 def _sections(spheres: Snapshot, planes: tuple[float, float]) -> Iterator[Section]:
@@ -167,139 +144,38 @@ def _sections(spheres: Snapshot, planes: tuple[float, float]) -> Iterator[Sectio
         yield next(section for section in result.sections if section.x_lo == planes[0])
 
 
-def full_size_rows(runs: Iterable[Path]) -> Iterator[Row]:
-    """Sections of finished runs: k/k0 by all spheres, and k by `SECTION_ARCHIE` over it.
-
-    No grid resolves a specimen of thousands of grains and fines. "cut out" has the pressure held
-    on both planes of a section, "in place" is from the pressures of the whole. A row `WHOLE` is of
-    the whole specimen, which has no two ways.
-    """
-    names = (ALL_SPHERES, SECTION_ARCHIE)
-    for path in runs:
-        run = open_run(path)
-        edges = [*(MM * one for one in EDGES_MM), run.case.size_m[0]]
-        laws = [(DEFAULT_LAW, name) for name in names]
-        results: list[Analysis] = list(
-            compare(run.spheres(), periodic=run.case.periodic, laws=laws, sections=edges)
-        )
-        whole, other = results
-        for one, own in zip(whole.sections, other.sections, strict=True):
-            yield {
-                "case": path.name,
-                "section": f"{one.x_lo / MM:g} to {one.x_hi / MM:g} mm",
-                "k_over_k0": one.k_damaged / one.k_initial,
-                SECTION_ARCHIE: own.k_damaged / one.k_damaged,
-                f"{SECTION_ARCHIE}: in place": own.k_damaged_inplace / one.k_damaged_inplace,
-            }
-        last = {
-            "case": path.name,
-            "section": WHOLE,
-            "k_over_k0": whole.k_damaged / whole.k_initial,
-        }
-        ratio = other.k_damaged / whole.k_damaged
-        yield last | {SECTION_ARCHIE: ratio, f"{SECTION_ARCHIE}: in place": ratio}
-
-
-def write_accuracy(validation: Path) -> str:
-    """Computes packs and slabs, writes their tables and the figure, returns the page's tables."""
-    stored = read_cases(truth_tables(), [DATA])[0]
-    write_named(validation / PACKS, list(pack_rows([*stored, *large_fines()])), digits=DIGITS)
-    write_named(validation / SLABS, list(slab_rows()), digits=DIGITS)
-    draw_accuracy(read_rows(validation / SLABS), validation / "accuracy.png")
-    return page_tables(validation)
-
-
-def write_full_size(runs: Sequence[Path], validation: Path) -> str:
-    """Writes the table of `runs`, returns the page's tables."""
-    write_named(validation / FULL_SIZE, list(full_size_rows(runs)), digits=DIGITS)
-    return page_tables(validation)
-
-
-def read_rows(path: Path) -> list[Row]:
-    """The rows of a written table; what is a number is read as one."""
-    return [{name: _number(text) for name, text in line.items()} for line in read_named(path)]
-
-
-def _number(text: str) -> float | str:
-    try:
-        return float(text)
-    except ValueError:
-        return text
-
-
-def page_tables(validation: Path) -> str:
-    """The tables of docs/accuracy.md, from the written files."""
-    packs, slabs = read_rows(validation / PACKS), read_rows(validation / SLABS)
-    full = read_rows(validation / FULL_SIZE)
+def tables(folder: Path) -> str:
+    """The tables of docs/evidence/accuracy.md in Markdown, from the written files."""
+    packs, cut = pd.read_csv(folder / PACKS), pd.read_csv(folder / SLABS)
+    ratio, many = cut["size_ratio"], cut[THROATS] >= FEW_THROATS
+    some = {name: (low <= ratio) & (ratio < high) for name, (low, high) in FINE_CLASSES.items()}
+    some |= {"all": ratio > 0, "put aside": cut["known_before"] == truth.LATER}
+    classes = {}
+    for name, among in some.items():
+        classes[f"{name}; {FEW_THROATS} throats or more"] = cut[among & many]
+        classes[f"{name}; fewer"] = cut[among & ~many]
+    classes[f"all; k/k0 above {LIGHT:g}"] = cut[cut["k_over_k0"] > LIGHT]
+    named = {pair: pair for pair in ALL_PAIRS if pair != PAIRS[1]}
+    k = {f"{FINEST}: k": "k itself, all-spheres"}
+    intact, filled = packs[packs["fines"] == 0], packs[packs["fines"] > 0]
+    kinds = {name: intact[intact["group"] == name] for name in truth.GROUPS}
+    sizes = {f"{size:.0f}": of for size, of in filled.groupby(filled["size_ratio"].round())}
     return "\n\n".join(
-        [slab_table(slabs), intact_table(packs), deposit_table(packs), full_size_table(full)]
+        [
+            _table("D/d", classes, named | k | {f"{DEFAULT_LAW}: k0": f"k0, {DEFAULT_LAW}"}),
+            _table("grains alone", kinds, {f"{law}: k0": law for law in LAWS}),
+            _table("D/d", sizes, {pair: pair for pair in ALL_PAIRS} | k),
+        ]
     )
 
 
-def slab_table(rows: Sequence[Row]) -> str:
-    """k/k0 of the slabs by `ALL_PAIRS`, and k0 and k by the default, by size ratio and throats."""
-    columns = {pair: pair for pair in ALL_PAIRS if pair != PAIRS[1]}
-    columns |= {f"{FINEST}: k": "k itself, all-spheres", f"{DEFAULT_LAW}: k0": "k0, lubrication"}
-    return _classes(_slab_classes(rows), "D/d", columns)
-
-
-def _slab_classes(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """The slabs by size ratio and throats, all of them, and those put aside."""
-    some: list[tuple[str, Callable[[Row], bool]]] = [
-        (name, lambda row, span=span: span[0] <= row["size_ratio"] < span[1])  # type: ignore[misc]
-        for name, span in FINE_CLASSES.items()
-    ]
-    some += [("all", lambda row: True), ("put aside", lambda row: row["known_before"] == LATER)]
-    return {
-        f"{name}; {words}": [
-            row for row in rows if among(row) and (row[THROATS] >= FEW_THROATS) == many
-        ]
-        for name, among in some
-        for words, many in ((f"{FEW_THROATS} throats or more", True), ("fewer", False))
-    }
-
-
-def intact_table(rows: Sequence[Row]) -> str:
-    """k0 of the packs without fines by every law, by kind of pack."""
-    groups = (EQUAL, UNEQUAL, LATTICE, LOOSE)
-    intact = [row for row in rows if not row["fines"]]
-    classes = {name: [row for row in intact if row["group"] == name] for name in groups}
-    return _classes(classes, "grains alone", {f"{law}: k0": law for law in LAWS})
-
-
-def deposit_table(rows: Sequence[Row]) -> str:
-    """k/k0 of the packs whose fines lie at random, by size ratio."""
-    deposits = [row for row in rows if row["fines"]]
-    classes = {
-        f"{number:.0f}": [row for row in deposits if round(row["size_ratio"]) == number]
-        for number in sorted({round(row["size_ratio"]) for row in deposits})
-    }
-    columns = {pair: pair for pair in ALL_PAIRS} | {f"{FINEST}: k": "k itself, all-spheres"}
-    return _classes(classes, "D/d", columns)
-
-
-def full_size_table(rows: Sequence[Row]) -> str:
-    """`SECTION_ARCHIE` over all spheres by depth: the span over the runs."""
-    lines = []
-    for section in dict.fromkeys(row["section"] for row in rows):
-        of = [row for row in rows if row["section"] == section]
-        spans = (
-            " to ".join(f"{pick(row[name] for row in of):.2f}" for pick in (min, max))
-            for name in ("k_over_k0", SECTION_ARCHIE)
-        )
-        lines.append([section, str(len(of)), *spans])
-    header = ["section", "runs", "k/k0, all-spheres", f"k, {SECTION_ARCHIE} over all-spheres"]
-    return markdown_table(header, lines)
-
-
-def _classes(classes: dict[str, list[Row]], label: str, columns: dict[str, str]) -> str:
-    """rms of ln and the worst ratio of some columns, one line for each class of rows."""
-    lines = [
-        [name, str(len(of)), *(summary(row[column] for row in of) for column in columns)]
-        for name, of in classes.items()
-        if of
-    ]
-    return markdown_table([label, "cases", *columns.values()], lines)
+def _table(label: str, classes: Mapping[str, pd.DataFrame], columns: Mapping[str, str]) -> str:
+    """Number of cases and `summary` of some columns, one line for each class of rows."""
+    lines = [[label, "cases", *columns.values()], ["---"] * (2 + len(columns))]
+    for name, of in classes.items():
+        if len(of):
+            lines.append([name, str(len(of)), *(summary(of[column]) for column in columns)])
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def summary(ratios: Iterable[float]) -> str:
@@ -314,34 +190,63 @@ def summary(ratios: Iterable[float]) -> str:
     return f"{words}, {worst:.{3 if worst < 2 else 1}f}"
 
 
-def draw_accuracy(slabs: Sequence[Row], path: Path) -> None:
-    """Left: k/k0 of the slabs over truth against their throats. Right: model against truth."""
-    import matplotlib as mpl
-
+def draw(folder: Path) -> None:
+    """Signed error of k/k0 of every slab by two laws, against k/k0 and against its throats."""
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12, 5.2), constrained_layout=True)
-    for (name, span), colour in zip(FINE_CLASSES.items(), (ORANGE, GREEN, BLUE), strict=True):
-        of = [row for row in slabs if span[0] <= row["size_ratio"] < span[1]]
-        throats = [row[THROATS] for row in of]
-        left.plot(throats, [row[FINEST] for row in of], "o", ms=4, color=colour, label=name)
-    left.axvline(FEW_THROATS, color=NEARLY_BLACK, lw=0.8, ls=":")
-    left.axhline(1.0, color=NEARLY_BLACK, lw=0.8)
-    left.set(xscale="log", xlabel="throats that carry the flow", ylabel="k/k0, model over truth")
-    left.set_title("all-spheres, by size ratio D/d", fontsize=10)
-    true = np.array([row["k_over_k0"] for row in slabs])
-    for pair, colour, marker in zip(
-        (PAIRS[0], ARCHIE, FINEST), (RED, BLUE, NEARLY_BLACK), "vso", strict=True
-    ):
-        model = true * np.array([row[pair] for row in slabs])
-        right.plot(true, model, marker, ms=4, color=colour, label=pair, alpha=0.8)
-    right.plot([true.min(), 1], [true.min(), 1], color=NEARLY_BLACK, lw=0.8)
-    right.set(xscale="log", yscale="log", xlabel="true k/k0", ylabel="k/k0 by the law")
-    right.set_title("slabs of deposits that LIGGGHTS made", fontsize=10)
-    for axes in (left, right):
+    cut = pd.read_csv(folder / SLABS)
+    figure, panels = plt.subplots(1, 2, figsize=(11, 4.8), sharey=True, constrained_layout=True)
+    for axes, against in zip(panels, ("k_over_k0", THROATS), strict=True):
+        for pair, colour, marker in ((ARCHIE, "#D55E00", "s"), (FINEST, "#0072B2", "o")):
+            error = 100.0 * (cut[pair] - 1.0)
+            axes.plot(cut[against], error, marker, ms=4, color=colour, alpha=0.7, label=pair)
+        axes.axhline(0.0, color="#1A1A1A", lw=0.8)
+        axes.set_xscale("log")
         axes.grid(lw=0.3)
-        axes.legend(fontsize=8)
-    with replacing(path) as part:
+    panels[1].axvline(FEW_THROATS, color="#1A1A1A", lw=0.8, ls=":")
+    panels[0].set(xlabel="k/k0 by resolved flow", ylabel="error of k/k0, %")
+    panels[1].set(xlabel="throats that carry the flow")
+    panels[0].legend()
+    with replacing(folder / FIGURE) as part:
         figure.savefig(part, dpi=110)
     plt.close(figure)
+
+
+def section_row(folder: Path) -> Row:
+    """The first section of a finished run by resolved flow and by the network (`fdnet stokes`)."""
+    case = open_run(folder).case
+    (section,) = stokes_sections(folder, across=ACROSS_A_FINE, follow=print)
+    return {"case": case.name, "seed": case.seed, "sides": case.box.sides} | dict(section)
+
+
+def write(rows: Iterable[Row], path: Path) -> None:
+    """A table of rows with nine significant digits."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
+        pd.DataFrame(list(rows)).to_csv(part, index=False, float_format="%.9g", na_rep="nan")
+
+
+def main(arguments: Sequence[str]) -> int:
+    """The command `python scripts/validation.py accuracy`."""
+    about = "Every law against resolved flow, on all packs and slabs."
+    parser = argparse.ArgumentParser("validation.py accuracy", description=about)
+    parser.add_argument("--quick", action="store_true", help="two packs and two slabs")
+    parser.add_argument("--out", type=path_option, help="where to write (docs/validation)")
+    parser.add_argument("--draw", action="store_true", help="figure and tables of what is written")
+    runs = "first sections of finished runs by resolved flow, alone"
+    parser.add_argument("--runs", type=path_option, nargs="+", metavar="RUN", help=runs)
+    asked = parser.parse_args(arguments)
+    folder = asked.out or (Path("runs/accuracy") if asked.quick else FOLDER)
+    if asked.runs:
+        write(map(section_row, asked.runs), folder / SECTIONS)
+        return 0
+    if not asked.draw:
+        quick = asked.quick
+        packs = truth.cases(["SC_touching", "C_r5_d2", "E_80_eps30"] if quick else [])
+        cut = truth.slabs(["slabO_r5_light", "slabE_r3"] if quick else [])
+        write(map(pack_row, packs), folder / PACKS)
+        write(map(slab_row, cut), folder / SLABS)
+    draw(folder)
+    print(tables(folder))
+    return 0

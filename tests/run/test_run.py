@@ -101,6 +101,10 @@ def test_the_folder_keeps_the_output_contract(whole):
         assert manifest[stage]["runs"][0]["deck_sha256"] == {deck: digest}
         names += [f"{stage}/{deck}", f"{stage}/log.liggghts"]
     assert {"pack", "invade", "analyse", "report"} <= set(summary["seconds"])
+    cpu, memory = summary["cpu_seconds"], summary["peak_memory_bytes"]
+    assert 0 < cpu["liggghts"] <= 1.1 * summary["seconds"]["liggghts"]
+    assert cpu["python"] > 0
+    assert 1e7 < memory["liggghts"] < memory["python"] < 1e10
     assert all((run / name).stat().st_size > 0 for name in names)
 
 

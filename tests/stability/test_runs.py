@@ -23,7 +23,7 @@ from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import Frame, read_dump
 from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind, Snapshot, resting
-from validation.dem.collisions import energy_run
+from validation.small_systems import thrown_pack
 
 pytestmark = pytest.mark.liggghts
 RADIUS = 0.05e-3
@@ -293,8 +293,8 @@ def test_a_damped_pack_comes_to_rest_up_to_the_largest_step_and_not_far_above(tm
     case = tiny(*(f"{part}.damping_ratio={damping}" for part in ("grains", "fines")))
     largest = largest_factor(case, scales_of(case).contacts)
     left = [
-        energy_run(
-            tmp_path, str(share), factor=share * largest, seed=1, spans=150, damping=damping
+        thrown_pack(
+            tmp_path / str(share), factor=share * largest, seed=1, spans=150, damping=damping
         )
         for share in (1.0, 1.5)
     ]

@@ -1,144 +1,106 @@
-"""The Stokes oracle: Zick and Homsy's arrays, order of convergence, a direct solve, invariances,
-necks, refusals."""
+"""The Stokes solver against closed forms, one sparse LU, and what must change nothing."""
 
-import csv
-from itertools import product
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from direct_stokes import direct_tensor
 
 from fdnet.errors import CaseError, FlowError
-from fdnet.network import stokes as forces
+from fdnet.network import stokes
 from fdnet.network.stokes import (
     OPEN,
     Lattice,
-    Response,
     divide,
     extrapolate,
     find_walls,
+    solve_slab,
     solve_stokes,
 )
-from fdnet.spheres.snapshot import Array, Snapshot
-from validation.truth.packs import DATA, OWN_TRUTH
+from fdnet.spheres.snapshot import resting
 
-SC = [[0.31, 0.17, 0.43]]
-BCC = [[0.1, 0.2, 0.3], [0.6, 0.7, 0.8]]
+SC, BCC = [[0.31, 0.17, 0.43]], [[0.1, 0.2, 0.3], [0.6, 0.7, 0.8]]
 FCC = [[0.1, 0.2, 0.3], [0.1, 0.7, 0.8], [0.6, 0.2, 0.8], [0.6, 0.7, 0.3]]
+HALF = Lattice(
+    low=np.zeros(3),
+    spacing=np.ones(3),
+    shape=(7, 8, 9),
+    walled=OPEN,
+    specimen=(0.0, 7.0),
+    repeats=True,
+    planes=True,
+)
+CUT = resting(
+    np.array(
+        [
+            *([-1.3, 2, 2.5], [0.4, 6, 5.0], [2.7, 2.2, 5.5], [6.9, 5.5, 2.0]),
+            *([8.6, 1.5, 6.1], [-2.6, 6, 1], [4.7, 7.5, 8.6]),
+        ]
+    ),
+    np.array([2.1, 1.7, 2.0, 2.2, 2.3, 2.9, 1.8]),
+    np.array([[0.0, 7.0], [0.0, 8.0], [0.0, 9.0]]),
+)
+"""Spheres of which five are cut by a plane, three with their centres outside; the other two end
+less than a cell before a plane."""
 
 
-def cell(
-    position: Array | list,
-    radius: Array | list | float,
-    edges: tuple[float, ...] = (1.0, 1.0, 1.0),
-) -> Snapshot:
-    place = np.asarray(position, float)
-    count = len(place)
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=np.array([[0.0, edge] for edge in edges]),
-        id=np.arange(count),
-        kind=np.ones(count),
-        position=place,
-        radius=np.broadcast_to(np.asarray(radius, float), count),
-        velocity=np.zeros((count, 3)),
-    )
+def cell(position, radius, edges=(1.0, 1.0, 1.0)):
+    return resting(np.asarray(position, float), radius, np.array([[0.0, edge] for edge in edges]))
 
 
-def lattice(shape: tuple[int, int, int], edges: Array | None = None) -> Lattice:
-    """A periodic grid, of cells of edge 1 where no edges of the whole are given."""
-    size = np.array(shape, float) if edges is None else edges
-    return Lattice(
-        low=np.zeros(3),
-        spacing=size / shape,
-        shape=shape,
-        walled=OPEN,
-        specimen=(0.0, float(size[0])),
-        repeats=True,
-    )
-
-
-def lattice_radius(places: list, solid: float) -> float:
-    return float((solid / len(places) * 3 / 4 / np.pi) ** (1 / 3))
-
-
-def literature(solid: float, drag: float, radius: float) -> float:
-    """k from the drag factor K, F = 6 pi mu R K U.
-
-    Zick and Homsy 1982, J. Fluid Mech. 115, 13, table 2.
-    """
+def zick_and_homsy(solid, drag, radius):
+    """k from the drag factor, F = 6 pi mu R K U (1982, J. Fluid Mech. 115, 13, table 2)."""
     return 2.0 * radius**2 / (9.0 * solid * drag)
 
 
+LATTICES = [
+    (SC, 0.343, 15.4, (24, 48), 0.004),
+    (BCC, np.pi * np.sqrt(3) / 8, 162.9, (32, 48), 0.01),
+    (SC, 0.064, 2.810, (24, 48), 0.002),
+    (SC, 0.216, 7.442, (24, 48), 0.002),
+    (SC, 0.45, 28.1, (24, 48), 0.004),
+    (SC, np.pi / 6, 42.1, (32, 48), 0.005),
+    (FCC, np.pi * np.sqrt(2) / 6, 435.0, (48, 64), 0.015),
+]
+
+
 @pytest.mark.parametrize(
-    ("places", "solid", "drag", "cells", "bound"),
-    [
-        (SC, 0.064, 2.810, (24, 48), 0.002),
-        (SC, 0.216, 7.442, (24, 48), 0.002),
-        (SC, 0.343, 15.4, (24, 48), 0.004),
-        (SC, 0.45, 28.1, (24, 48), 0.004),
-        (SC, np.pi / 6, 42.1, (32, 48), 0.005),
-        (BCC, np.pi * np.sqrt(3) / 8, 162.9, (32, 48), 0.01),
-        (FCC, np.pi * np.sqrt(2) / 6, 435.0, (48, 64), 0.015),
-    ],
+    "lattices", [LATTICES[:2], pytest.param(LATTICES[2:], marks=pytest.mark.nightly)]
 )
-def test_zick_and_homsy(places, solid, drag, cells, bound):
-    pack = cell(places, lattice_radius(places, solid))
-    k = extrapolate(*(solve_stokes(pack, cells=n) for n in cells)).k
-    assert k == pytest.approx(literature(solid, drag, pack.radius[0]), rel=bound)
+def test_zick_and_homsy(lattices):
+    for places, solid, drag, cells, bound in lattices:
+        pack = cell(places, (solid / len(places) * 3 / 4 / np.pi) ** (1 / 3))
+        k = extrapolate(*(solve_stokes(pack, cells=n) for n in cells)).k
+        assert k == pytest.approx(zick_and_homsy(solid, drag, pack.radius[0]), rel=bound)
 
 
+@pytest.mark.nightly
+@pytest.mark.parametrize(("x_lo", "x_hi"), [(0.0, 0.5), (0.5, 1.0), (-0.5, 1.0)])
+def test_zick_and_homsy_cut_at_planes_of_symmetry(x_lo, x_hi):
+    """Touching spheres, cut through their centres and between them."""
+    chain = cell([[i, 0.3, 0.7] for i in range(-2, 4)], 0.5)
+    cells = (48, 72) if x_hi - x_lo > 1.0 else (32, 48)
+    k = extrapolate(*(solve_slab(chain, (x_lo, x_hi), cells=n) for n in cells)).k
+    assert k == pytest.approx(zick_and_homsy(np.pi / 6, 42.1, 0.5), rel=0.005)
+
+
+@pytest.mark.nightly
 def test_second_order():
-    pack = cell(SC, lattice_radius(SC, 0.45))
-    exact = literature(0.45, 28.09, pack.radius[0])
+    pack = cell(SC, (0.45 * 3 / 4 / np.pi) ** (1 / 3))
+    exact = zick_and_homsy(0.45, 28.09, pack.radius[0])
     error = [solve_stokes(pack, cells=n).k / exact - 1.0 for n in (16, 32, 64)]
     order = np.log2(np.array(error[:-1]) / error[1:])
     assert np.all((order > 1.7) & (order < 2.4)), order
 
 
-def test_grid_offset_within_the_error():
-    radius = lattice_radius(SC, 0.45)
-    ks = [
-        solve_stokes(cell([[x, x / 3, 0.7 * x]], radius), cells=32).k
-        for x in (0.0, 0.01, 0.5 / 32, 0.02, 0.5)
-    ]
-    assert np.ptp(ks) < 0.006 * np.mean(ks)
-
-
-def test_green_solves_the_discrete_stokes_equations():
-    rng = np.random.default_rng(1)
-    force = [rng.normal(size=(6, 8, 5)) for _ in range(3)]
-    force = [part - part.mean() for part in force]
-    response = Response((6, 8, 5), OPEN, np.ones(3))
-    velocity = response.velocity([part.astype(np.float32) for part in force])
-    divergence = sum(np.roll(v, -1, axis=d) - v for d, v in enumerate(velocity))
-    assert np.abs(divergence).max() < 1e-5
-    excess = [
-        f + sum(np.roll(v, s, axis=d) - v for d, s in product(range(3), (1, -1)))
-        for f, v in zip(force, velocity, strict=True)
-    ]
-    curl = [
-        np.roll(excess[a], 1, axis=b) - excess[a] - np.roll(excess[b], 1, axis=a) + excess[b]
-        for a, b in ((0, 1), (1, 2), (2, 0))
-    ]
-    assert max(np.abs(part).max() for part in curl) < 1e-5
-    assert max(np.abs(part).max() for part in excess) > 0.1
-
-
-def tensor_of(pack: Snapshot, cells: int) -> Array:
-    """K (3, 3), m2, by the direct solve."""
-    edges = np.diff(pack.box)[:, 0]
-    grid = lattice(divide(edges, cells), edges)
-    walls = [find_walls(grid, d, pack.position, pack.radius) for d in range(3)]
-    return direct_tensor(grid.shape, [(wall.node, wall.slack) for wall in walls]) * grid.unit**2
-
-
 def test_a_direct_solve_gives_the_same_tensor():
     rng = np.random.default_rng(5)
-    pack = cell(rng.random((4, 3)) * [1.0, 0.8, 0.9], [0.2, 0.25, 0.3, 0.15], (1.0, 0.8, 0.9))
-    tensor = tensor_of(pack, 10)
-    np.testing.assert_allclose(tensor, tensor.T, atol=1e-9 * tensor.max())
+    edges = np.array([1.0, 0.8, 0.9])
+    pack = cell(rng.random((4, 3)) * edges, [0.2, 0.25, 0.3, 0.15], edges)
+    shape = divide(edges, 10)
+    grid = replace(HALF, spacing=edges / shape, shape=shape, specimen=(0.0, 1.0), planes=False)
+    walls = [find_walls(grid, d, pack.position, pack.radius) for d in range(3)]
+    tensor = direct_tensor(shape, [(wall.node, wall.slack) for wall in walls]) * grid.unit**2
     for axis in range(3):
         free, held = (
             solve_stokes(pack, cells=10, axis=axis, tolerance=1e-6, transverse=way).k
@@ -149,96 +111,111 @@ def test_a_direct_solve_gives_the_same_tensor():
         assert held < free * (1.0 - 1e-3)
 
 
-def test_walls_stand_where_the_sphere_is():
-    point, r = np.array([3.7, 4.2, 5.1]), 2.3
-    walls = find_walls(lattice((9, 10, 11)), 1, point[None], np.array([r]))
-    offset = np.array([0.5, 0.0, 0.5])
-    for node, slack in zip(walls.node, walls.slack, strict=True):
-        place = np.array(np.unravel_index(node, (9, 10, 11))) + offset
-        depth = r - np.linalg.norm(place - point)
-        if slack == 0.0:
-            assert 0.0 <= depth < 1.0
-            continue
-        drag = 0.0
-        for way in [*np.eye(3), *-np.eye(3)]:
-            steps = np.linspace(0.0, 1.0, 100_001)
-            within = np.linalg.norm(place + steps[:, None] * way - point, axis=1) <= r
-            drag += 1.0 / steps[np.argmax(within)] - 1.0 if within[-1] else 0.0
-        assert depth < 0.0
-        assert 1.0 / slack == pytest.approx(drag, rel=1e-3, abs=1e-4)
-    assert np.count_nonzero(walls.slack == 0.0) == sum(
-        0.0 <= r - np.linalg.norm(np.array(i) + offset - point) < 1.0
-        for i in np.ndindex(9, 10, 11)
-    )
+def whole(node, shape, component):
+    """Flat indices (2, M) in the doubled grid of nodes of the half and of their images."""
+    i, j, k = np.unravel_index(node, (shape[0] + (component == 0), *shape[1:]))
+    doubled = (2 * shape[0], *shape[1:])
+    image = (2 * shape[0] - i - (component != 0)) % doubled[0]
+    return np.stack([np.ravel_multi_index((a, j, k), doubled) for a in (i, image)])
+
+
+def test_a_direct_solve_of_the_whole_mirrored_cell_gives_the_same():
+    """One sparse LU on the doubled grid, with the walls of the half copied to their images."""
+    walls = []
+    for d in range(3):
+        half = find_walls(HALF, d, CUT.position, CUT.radius)
+        walls.append((whole(half.node, HALF.shape, d).ravel(), np.tile(half.slack, 2)))
+    tensor = direct_tensor((14, 8, 9), walls)
+    assert np.abs(tensor[0, 1:]).max() < 1e-9 * tensor[0, 0]
+    k = solve_slab(CUT, (0.0, 7.0), cells=9, tolerance=1e-6).k
+    assert k == pytest.approx(tensor[0, 0], rel=1e-4)
+
+
+def test_half_of_a_cell_is_the_whole():
+    """Spheres that no plane cuts, with their images on the periodic grid."""
+    rng = np.random.default_rng(4)
+    place = rng.random((6, 3)) * [0.2, 1.0, 1.0] + [0.15, 0.0, 0.0]
+    half = cell(place, 0.14, (0.5, 1.0, 1.0))
+    both = cell(np.vstack([place, place * [-1, 1, 1]]), 0.14)
+    k = solve_slab(half, (0.0, 0.5), cells=20, tolerance=1e-6).k
+    assert k == pytest.approx(solve_stokes(both, cells=20, tolerance=1e-6).k, rel=1e-6)
+
+
+@pytest.mark.parametrize(("closed", "expected"), [((False, True, True), 0.035144), (None, 1 / 12)])
+def test_walls_hold_the_fluid_as_in_a_duct(closed, expected):
+    """In a square duct 0.035144 a^2 (Shah and London 1978), between plates h^2 / 12.
+
+    The sphere buried in a wall closes nothing.
+    """
+    buried = cell([[0.2, 0.5, -0.2]], 0.1, (0.5, 1.0, 1.0))
+    closed = closed or (False, False, True)
+    flows = (solve_slab(buried, (0.0, 0.5), cells=n, closed=closed) for n in (20, 32))
+    assert extrapolate(*flows).k == pytest.approx(expected, rel=0.002)
 
 
 def test_turning_scaling_tiling_and_shifting_by_a_cell_change_nothing():
     rng = np.random.default_rng(3)
     place, radius = rng.random((5, 3)), 0.15 + 0.15 * rng.random(5)
+    two = cell(np.vstack([place, np.add(place, [0, 1, 0])]), np.tile(radius, 2), (1, 2, 1))
     k = solve_stokes(cell(place, radius), cells=20).k
-    turned = solve_stokes(cell(place[:, [1, 2, 0]], radius), cells=20, axis=2).k
-    large = solve_stokes(cell(1e-3 * place, 1e-3 * radius, (1e-3,) * 3), cells=20).k
-    tiled = solve_stokes(
-        cell(np.vstack([place, place + np.array([0, 1, 0])]), np.tile(radius, 2), (1, 2, 1)),
-        cells=40,
-    ).k
-    shifted = solve_stokes(cell(place + np.array([0.05, 0.1, -0.15]), radius), cells=20).k
-    assert [turned, 1e6 * large, tiled, shifted] == pytest.approx([k] * 4, rel=3e-4)
+    others = [
+        solve_stokes(cell(place[:, [1, 2, 0]], radius), cells=20, axis=2).k,
+        1e6 * solve_stokes(cell(1e-3 * place, 1e-3 * radius, (1e-3,) * 3), cells=20).k,
+        solve_stokes(two, cells=40).k,
+        solve_stokes(cell(np.add(place, [0.05, 0.1, -0.15]), radius), cells=20).k,
+    ]
+    assert others == pytest.approx([k] * 4, rel=3e-4)
 
 
-def test_necks_between_overlapping_spheres_do_not_leak():
-    """Spheres buried in the necks of a percolating solid close any inner path.
-
-    They must change nothing.
-    """
-    radius = 0.58
-    middle = np.array([[0.5, 0.5, 0.5]])
-    neck = np.array([[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0]])
-    buried = cell(np.vstack([middle, neck]), [radius, *[0.28] * 3])
-    assert np.all(np.hypot(0.28, 0.5) < radius)
-    open_, closed = (
-        solve_stokes(pack, cells=40, tolerance=2e-5).k for pack in (cell(middle, radius), buried)
-    )
-    assert open_ == pytest.approx(closed, rel=2e-3)
-
-
-def test_swallowed_and_doubled_spheres_change_nothing():
-    one = cell([[0.4, 0.5, 0.6]], 0.3)
-    many = cell([[0.4, 0.5, 0.6], [0.4, 0.5, 0.6], [0.42, 0.5, 0.6]], [0.3, 0.3, 0.1])
-    ks = [solve_stokes(pack, cells=24, tolerance=1e-5).k for pack in (one, many)]
-    assert ks[0] == pytest.approx(ks[1], rel=1e-4)
+@pytest.mark.nightly
+def test_spheres_buried_in_the_solid_change_nothing():
+    """In the necks of a percolating solid, in one that both planes cut, and doubled ones."""
+    neck = [[0.5, 0.5, 0.5], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.5, 0.5, 0.0]]
+    packs = cell(neck[:1], 0.58), cell(neck, [0.58, *[0.28] * 3])
+    one, many = (solve_stokes(pack, cells=40, tolerance=2e-5).k for pack in packs)
+    assert one == pytest.approx(many, rel=2e-3)
+    inner = np.arange(0.5, 5.0, 0.5)
+    nested = [cell([[4.0, 8, 8]] * len(r), r, (8, 16, 16)) for r in ([5.0], [5.0, *inner])]
+    one, many = (solve_slab(pack, (0.0, 8.0), cells=32).k for pack in nested)
+    assert one == pytest.approx(many, rel=1e-3)
+    twice = cell([[0.4, 0.5, 0.6], [0.4, 0.5, 0.6], [0.42, 0.5, 0.6]], [0.3, 0.3, 0.1])
+    packs = twice, cell([[0.4, 0.5, 0.6]], 0.3)
+    one, many = (solve_stokes(pack, cells=24, tolerance=1e-5).k for pack in packs)
+    assert one == pytest.approx(many, rel=1e-4)
 
 
-def test_stored_truth_lies_below_a_coarse_grid_by_its_error():
-    with (DATA / OWN_TRUTH).open(newline="") as file:
-        truth = next(row for row in csv.DictReader(file) if row["case"] == "packH_40_eps40")
-    table = np.genfromtxt(
-        DATA / truth["file"],
-        delimiter=",",
-        skip_header=2,
-        usecols=range(4),
-    )
-    pack = cell(table[:, :3], table[:, 3], (float(truth["edge_mm"]),) * 3)
-    grids = [solve_stokes(pack, cells=n) for n in (32, 48)]
-    assert grids[0].k > grids[1].k > float(truth["k_mm2"])
-    assert extrapolate(*grids).k == pytest.approx(float(truth["k_mm2"]), rel=0.02)
+def test_the_drag_of_a_wall_on_cells_of_unequal_edges():
+    """Along each axis (1/t - 1) over the square of the edge, for a free share t of the step."""
+    step, place, r = np.array([0.8, 1.25, 1.0]), np.array([4.1, 5.3, 4.4]), 2.2
+    grid = replace(HALF, shape=(11, 8, 9), spacing=step, planes=False)
+    walls = find_walls(grid, 0, place[None], np.array([r]))
+    free, offset = walls.slack > 0.0, np.array([0.0, 0.5, 0.5])
+    for node, slack in zip(walls.node[free], walls.slack[free], strict=True):
+        away = place - (np.array(np.unravel_index(node, grid.shape)) + offset) * step
+        ahead, aside = np.abs(away), away @ away - away**2
+        inside = (ahead - step) ** 2 + aside <= r * r
+        gap = ahead - np.sqrt(np.maximum(r * r - aside, 0.0))
+        drag = np.sum((step[inside] / gap[inside] - 1.0) / step[inside] ** 2)
+        assert 1.0 / slack == pytest.approx(step[0] ** 2 * drag, rel=1e-4)
+    assert free.sum() > 40
 
 
 def test_refusals(monkeypatch):
-    with pytest.raises(CaseError, match="at least 4"):
-        solve_stokes(cell(SC, 0.3), cells=3)
+    one = cell(SC, 0.3)
+    for pack, settings, words in (
+        (one, {"cells": 3}, "at least 4"),
+        (cell(np.zeros((0, 3)), np.zeros(0)), {"cells": 10}, "no wall"),
+        (one, {"cells": 10, "axis": 3}, "axis 3"),
+    ):
+        with pytest.raises(CaseError, match=words):
+            solve_stokes(pack, **settings)
     with pytest.raises(CaseError, match="no wall"):
-        solve_stokes(cell(np.zeros((0, 3)), np.zeros(0)), cells=10)
-    with pytest.raises(CaseError, match="axis 3"):
-        solve_stokes(cell(SC, 0.3), cells=10, axis=3)
-    flow = solve_stokes(cell(SC, 0.3), cells=10)
+        solve_slab(CUT, (40.0, 47.0), cells=9)
+    flow = solve_stokes(one, cells=10)
     with pytest.raises(CaseError, match="finer"):
         extrapolate(flow, flow)
-    monkeypatch.setattr(forces, "MOST_ITERATIONS", 5)
+    with pytest.raises(FlowError):  # closed pores are no flow
+        solve_stokes(cell([[0.5, 0.5, 0.5]], 0.74), cells=16)
+    monkeypatch.setattr(stokes, "MOST_ITERATIONS", 5)
     with pytest.raises(FlowError, match="after 5 iterations"):
         solve_stokes(cell(SC, 0.4), cells=16)
-
-
-def test_closed_pores_are_no_flow():
-    with pytest.raises(FlowError):
-        solve_stokes(cell([[0.5, 0.5, 0.5]], 0.74), cells=16)
