@@ -1,4 +1,7 @@
-"""Forces of the fluid on fines: drag in a crowd, at speed, in a throat; the pressure gradient."""
+"""Laws of the fluid's forces on fines: drag in a crowd, at speed, in a throat; pressure gradient.
+
+A run applies them in the deck (`_drag.in.j2`), or in `fdnet.run.fluid` where the drag is coupled.
+"""
 
 import math
 from dataclasses import dataclass
