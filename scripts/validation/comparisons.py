@@ -26,7 +26,6 @@ from fdnet.dem.liggghts import Binary, Launch, find_binary
 from fdnet.dem.packing import make_pack
 from fdnet.errors import CaseError, FdnetError
 from fdnet.files import path_option, refuse_folder_name, replacing, write_text
-from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
 
