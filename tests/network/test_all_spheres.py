@@ -64,7 +64,7 @@ def test_k_is_that_of_the_network_of_all_spheres(pack, analysis):
     [("packH_r5_d1", 0.8866), ("packC_r10_d2", 0.4804), ("packC_r10_d5", 0.2126)],
 )
 def test_fines_lower_k_as_resolved_flow_does(name, ratio):
-    """Random deposits come out 1 and 3 % high, and 4 % low (docs/accuracy.md)."""
+    """Random deposits come out 1 and 3 % high, and 4 % low (docs/evidence/accuracy.md)."""
     spheres = read_pack(name)
     result = analyse(spheres, periodic="xyz", walls="slip", damage_law="all-spheres")
     assert result.k_damaged / result.k_initial == pytest.approx(ratio, rel=0.06)
