@@ -41,7 +41,7 @@ PACKS, SLABS, FIGURE = "accuracy_packs.csv", "accuracy_slabs.csv", "accuracy.png
 SECTIONS = "stokes_sections.csv"
 THROATS = "throats"
 """Number of throats that carry the flow through grains and fines (`Flow.carrying_throats`)."""
-FINE_CLASSES = {"3 to 4": (0.0, 4.5), "5 to 6": (4.5, 7.0), "8 to 10": (7.0, np.inf)}
+SIZES = {"3 to 4": (0.0, 4.5), "5 to 6": (4.5, 7.0), "8 to 10": (7.0, np.inf)}
 """Size ratio D/d, the mean radius of the grains over that of the fines."""
 LIGHT = 0.9
 """k/k0 from which on the damage of a slab is light."""
@@ -148,23 +148,22 @@ def tables(folder: Path) -> str:
     """The tables of docs/evidence/accuracy.md in Markdown, from the written files."""
     packs, cut = pd.read_csv(folder / PACKS), pd.read_csv(folder / SLABS)
     ratio, many = cut["size_ratio"], cut[THROATS] >= FEW_THROATS
-    some = {name: (low <= ratio) & (ratio < high) for name, (low, high) in FINE_CLASSES.items()}
-    some |= {"all": ratio > 0, "put aside": cut["known_before"] == truth.LATER}
-    classes = {}
-    for name, among in some.items():
+    classes = {name: cut[(low <= ratio) & (ratio < high)] for name, (low, high) in SIZES.items()}
+    for name, among in (("all", ratio > 0), ("put aside", cut["known_before"] == truth.LATER)):
         classes[f"{name}; {FEW_THROATS} throats or more"] = cut[among & many]
         classes[f"{name}; fewer"] = cut[among & ~many]
-    classes[f"all; k/k0 above {LIGHT:g}"] = cut[cut["k_over_k0"] > LIGHT]
-    named = {pair: pair for pair in ALL_PAIRS if pair != PAIRS[1]}
-    k = {f"{FINEST}: k": "k itself, all-spheres"}
+    classes[f"k/k0 above {LIGHT:g}"] = cut[cut["k_over_k0"] > LIGHT]
+    laws = {PAIRS[0]: "thesis", ARCHIE: SECTION_ARCHIE, FINEST: ALL_SPHERES}
+    k = {f"{FINEST}: k": f"k, {ALL_SPHERES}"}
+    slab_columns = laws | k | {f"{DEFAULT_LAW}: k0": "k0"}
     intact, filled = packs[packs["fines"] == 0], packs[packs["fines"] > 0]
     kinds = {name: intact[intact["group"] == name] for name in truth.GROUPS}
-    sizes = {f"{size:.0f}": of for size, of in filled.groupby(filled["size_ratio"].round())}
+    filled_by = {f"{size:.0f}": of for size, of in filled.groupby(filled["size_ratio"].round())}
     return "\n\n".join(
         [
-            _table("D/d", classes, named | k | {f"{DEFAULT_LAW}: k0": f"k0, {DEFAULT_LAW}"}),
+            _table("D/d", classes, slab_columns),
             _table("grains alone", kinds, {f"{law}: k0": law for law in LAWS}),
-            _table("D/d", sizes, {pair: pair for pair in ALL_PAIRS} | k),
+            _table("D/d", filled_by, laws | k),
         ]
     )
 
