@@ -39,7 +39,7 @@ import tomli_w
 
 import fdnet
 from fdnet.case.file import toml_tables
-from fdnet.dem.liggghts import peak_memory
+from fdnet.dem.liggghts import resident_peak
 from fdnet.errors import CaseError, FdnetError
 from fdnet.files import path_option, refuse_folder_name, write_text
 from validation import judge
@@ -177,7 +177,7 @@ def measure_point(study: Study, point: Point, work: Path) -> dict[str, Any]:
         found, status = {}, f"refused: {words}"
     except MemoryError:
         found, status = {}, "over memory"
-    costs = {"core_s": _processors() - before, "rss_mb": peak_memory() / 1e6, "steps": None}
+    costs = {"core_s": _processors() - before, "rss_mb": resident_peak() / 1e6, "steps": None}
     return {**costs, **found, "status": status}
 
 
