@@ -124,8 +124,8 @@ class Comparison:
 
     def values(self, variant: str, quantity: str) -> dict[int, float]:
         """The quantity of the finished runs of a variant, by seed; those without one left out."""
-        found = {entry.seed: entry.number(quantity) for entry in self.of_variant(variant)}
-        return {seed: float(value) for seed, value in found.items() if value is not None}
+        numbers = {entry.seed: entry.number(quantity) for entry in self.of_variant(variant)}
+        return {seed: float(value) for seed, value in numbers.items() if value is not None}
 
     def keys_of(self, variant: str) -> Mapping[str, Any]:
         """The varied keys of a variant."""
