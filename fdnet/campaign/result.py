@@ -436,16 +436,10 @@ def _band_row(band: Band) -> dict[str, Any]:
 
 
 def _pair_row(pair: Pair) -> dict[str, Any]:
-    band, paired, p_value, seeds_needed = pair.difference
-    return {
-        "one": pair.one,
-        "other": pair.other,
-        "difference": _band_row(band),
-        "paired": paired,
-        "p_value": None if math.isnan(p_value) else p_value,
-        "apart": pair.apart,
-        "seeds_needed": seeds_needed,
-    }
+    gap = pair.difference._asdict()
+    p_value = None if math.isnan(gap["p_value"]) else gap["p_value"]
+    row = {"one": pair.one, "other": pair.other, "difference": _band_row(gap.pop("band"))}
+    return row | gap | {"p_value": p_value, "apart": pair.apart}
 
 
 # ------------------------------------------------------------------------------------------------
