@@ -54,7 +54,7 @@ class HowToRun:
 
     @property
     def options(self) -> list[str]:
-        """Options of `fdnet run`, beside those of the plan."""
+        """Options of `fdnet run` that are not those of the plan."""
         path = self.liggghts and str(Path(self.liggghts).expanduser().absolute())
         timeout = None if self.timeout is None else repr(self.timeout)
         given = {"--liggghts": path, "--launcher": self.launcher, "--timeout": timeout}

@@ -91,6 +91,7 @@ LABELS = {
     "invasion_depth_p95_m": "depth above which 95 % of the fines lie",
     "invaded_count": "fines that invaded",
     "passed_count": "fines that passed",
+    "passed_fraction": "share of the fines that pass through the specimen unbridged",
     "cake_thickness_m": "thickness of the cake",
     "porosity_damaged": "damaged porosity",
 }
@@ -203,10 +204,10 @@ def candidate_lines(muds: Sequence[Candidate]) -> list[str]:
 
 
 def _reason(verdict: Verdict) -> str:
-    goal, limit = verdict.goal, value_text(verdict.goal.quantity, verdict.limit)
-    more = f", some {verdict.seeds_needed} seeds would decide it" if verdict.seeds_needed else ""
-    band = band_text(goal.quantity, verdict.band)
-    return f"{goal.words} {band}, at most {limit}: {verdict.state}{more}"
+    quantity, limit, band, state, seeds = verdict
+    more = f", some {seeds} seeds would decide it" if seeds else ""
+    most = value_text(quantity, limit)
+    return f"{label(quantity)} {band_text(quantity, band)}, at most {most}: {state}{more}"
 
 
 # ------------------------------------------------------------------------------------------------

@@ -321,7 +321,8 @@ def _check_judge(place: str, judge: Mapping[str, Any], variants: Sequence[Varian
         section = re.fullmatch(r"sections\.[1-9]\d*\.(\w+)", name)
         known, last = (SummarySection, section[1]) if section else (Summary, name)
         near = difflib.get_close_matches(last, known.model_fields, n=3, cutoff=0.8)
-        if last not in known.model_fields and (near or not re.fullmatch(r"\w+(\.\w+)*", name)):
+        further = re.fullmatch(r"\w+(\.\w+)*", name) and last.startswith(tuple(near) or "")
+        if last not in known.model_fields and not further:
             raise CaseError(
                 f"{place}.quantities: {name!r} is no number of the summaries; did you mean "
                 f"{', '.join(near) or 'k_reduction'}?"
@@ -340,6 +341,7 @@ _Seed = Annotated[int, Field(ge=0, lt=2**31)]
 class _Row(JsonObject):
     name: _Name
     variant: _Name = "itself"
+    keys: Mapping[str, Any] = {}
     seed: _Seed = 0
 
 
@@ -350,6 +352,10 @@ class _PlanRecord(JsonObject):
     name: str
     digest: str
     seeds: Annotated[list[_Seed], Field(min_length=1)]
+    ranks: Annotated[int, Field(ge=1)] = 1
+    stages: Sequence[str] = STAGES
+    targets: Mapping[str, Any] = {}
+    judge: Mapping[str, Any] = {}
     variants: Annotated[list[_Row], Field(min_length=1)]
     runs: Annotated[list[_Row], Field(min_length=1)]
 
@@ -373,17 +379,13 @@ def kept_plan(folder: Path) -> Plan | None:
     record = read_plan_record(folder)
     if record is None:
         return None
-    first = {one["variant"]: folder / CASES / f"{one['name']}.toml" for one in record["runs"]}
-    return Plan(
-        name=record["name"],
-        variants=tuple(
-            Variant(one["name"], one["keys"], read_case(first[one["name"]]))
-            for one in record["variants"]
-        ),
-        seeds=tuple(record["seeds"]),
-        **{key: record[key] for key in ("ranks", "targets", "judge") if key in record},
-        stages=tuple(record.get("stages", STAGES)),
-    )
+    seeds, variants = tuple(record["seeds"]), []
+    for one in record["variants"]:
+        case = read_case(folder / CASES / f"{one['name']}-seed-{seeds[0]}.toml")
+        variants.append(Variant(one["name"], one.get("keys", {}), case))
+    rest = {key: record[key] for key in ("ranks", "targets", "judge") if key in record}
+    stages = tuple(record.get("stages", STAGES))
+    return Plan(name=record["name"], variants=tuple(variants), seeds=seeds, stages=stages, **rest)
 
 
 @contextlib.contextmanager
@@ -440,9 +442,8 @@ def _admitted(path: Path, plan: Plan) -> Plan:
             f"{record['digest']}, this one {plan.digest}); give another --out (nothing was "
             "changed)"
         )
-    return extended(
-        path, replace(plan, seeds=tuple(record["seeds"])) if record else plan, plan.seeds
-    )
+    before = plan.seeds if record is None else tuple(record["seeds"])
+    return extended(path, replace(plan, seeds=before), plan.seeds)
 
 
 def extended(path: Path, plan: Plan, seeds: Sequence[int]) -> Plan:
@@ -459,21 +460,10 @@ def extended(path: Path, plan: Plan, seeds: Sequence[int]) -> Plan:
             write_text(file, text)
         row = {"name": job.name, "variant": job.variant.name, "seed": job.case.seed}
         rows.append(row | {"pack": packs.get(job.name, "")})
-    record = {
-        "fdnet_campaign": 1,
-        "name": plan.name,
-        "digest": plan.digest,
-        "seeds": list(plan.seeds),
-        "ranks": plan.ranks,
-        "stages": list(plan.stages),
-        "targets": dict(plan.targets),
-        "judge": dict(plan.judge),
-        "variants": [
-            {"name": one.name, "keys": dict(one.keys), "pack": one.case.digest("pack")}
-            for one in plan.variants
-        ],
-        "runs": rows,
-    }
+    kept = ("name", "digest", "seeds", "ranks", "stages", "targets", "judge")
+    record = {"fdnet_campaign": 1} | {name: getattr(plan, name) for name in kept}
+    record["variants"] = [{"name": one.name, "keys": one.keys} for one in plan.variants]
+    record["runs"] = rows
     write_text(path / PLAN, json.dumps(record, indent=1, default=str) + "\n")
     return plan
 
@@ -497,10 +487,8 @@ def state_of(path: Path, plan: Plan, job: Job) -> State:
     """
     folder = path / RUNS / job.name
     if not (folder / MANIFEST).exists():
-        logs = (
-            path / LOGS / f"{name}.txt" for name in (job.name, f"pack-{job.case.digest('pack')}")
-        )
-        reason = next(filter(None, map(last_words, logs)), "")
+        names = (job.name, f"pack-{job.case.digest('pack')}")
+        reason = next(filter(None, (last_words(path / LOGS / f"{n}.txt") for n in names)), "")
         return State("failed", reason) if reason else State("missing", "not run yet")
     try:
         manifest, case = check_finished(folder)

@@ -23,6 +23,7 @@ from fdnet.statistics.bands import Band, seeds_for_width, student_band
 from fdnet.statistics.differences import MOST_SEEDS, Difference, difference, holm
 
 RANKED_BY = "k_reduction"
+PASSED = "passed_fraction"
 TABLE, SUMMARY, PAGE = "table.csv", "summary.json", "compare.html"
 SHARES = re.compile(r"(^|\.)(k_reduction|.*porosity.*|.*_fraction|.*_share|\w*over_initial)$")
 """Quantities that are shares of one: a reader sees them in percent."""
@@ -124,8 +125,8 @@ class Comparison:
 
     def values(self, variant: str, quantity: str) -> dict[int, float]:
         """The quantity of the finished runs of a variant, by seed; those without one left out."""
-        found = {entry.seed: entry.number(quantity) for entry in self.of_variant(variant)}
-        return {seed: float(value) for seed, value in found.items() if value is not None}
+        numbers = {entry.seed: entry.number(quantity) for entry in self.of_variant(variant)}
+        return {seed: float(value) for seed, value in numbers.items() if value is not None}
 
     def keys_of(self, variant: str) -> Mapping[str, Any]:
         """The varied keys of a variant."""
@@ -292,11 +293,13 @@ def _folders(run: Path, left_out: list[str]) -> Iterator[Path]:
 def _numbers_of(folder: Path) -> dict[str, Any]:
     """Every number of the summary of a run, by dotted key, and a few of its texts.
 
-    Sections are numbered from 1: `sections.1.k_damaged_m2`. Of the lists of sentences it gives the
-    number of sentences. Raises CaseError when the summary cannot be read.
+    Sections are numbered from 1: `sections.1.k_damaged_m2`. Lists of sentences give their number,
+    and counts the share of the fines that passed. Raises CaseError as `read_summary` does.
     """
-    flat = dict(_flat("", read_summary(folder / SUMMARY)))
-    return {key: value for key, value in flat.items() if key != "seed"}
+    summary = read_summary(folder / SUMMARY)
+    flat = {key: value for key, value in _flat("", summary) if key != "seed"}
+    supplied = summary["supplied_count"]
+    return flat | ({PASSED: summary["passed_count"] / supplied} if supplied else {})
 
 
 def _flat(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -433,16 +436,10 @@ def _band_row(band: Band) -> dict[str, Any]:
 
 
 def _pair_row(pair: Pair) -> dict[str, Any]:
-    band, paired, p_value, seeds_needed = pair.difference
-    return {
-        "one": pair.one,
-        "other": pair.other,
-        "difference": _band_row(band),
-        "paired": paired,
-        "p_value": None if math.isnan(p_value) else p_value,
-        "apart": pair.apart,
-        "seeds_needed": seeds_needed,
-    }
+    gap = pair.difference._asdict()
+    p_value = None if math.isnan(gap["p_value"]) else gap["p_value"]
+    row = {"one": pair.one, "other": pair.other, "difference": _band_row(gap.pop("band"))}
+    return row | gap | {"p_value": p_value, "apart": pair.apart}
 
 
 # ------------------------------------------------------------------------------------------------
@@ -453,42 +450,18 @@ MET, OPEN, MISSED = "met", "open", "missed"
 """The 95 % band lies below the limit, across it, or above it."""
 
 
-class Goal(NamedTuple):
-    """A target of a design, a largest value that is accepted: in words, the quantity that gives
-    its unit and bounds, its value in one finished run, and the limit from its text, SI."""
-
-    words: str
-    quantity: str
-    of_run: Callable[[Entry], float | None]
-    read: Callable[[str], float]
-
-
-def _passed(entry: Entry) -> float | None:
-    passed, supplied = entry.number("passed_count"), entry.number("supplied_count")
-    return passed / supplied if passed is not None and supplied else None
-
-
-GOALS: Mapping[str, Goal] = {
-    "depth": Goal(
-        "depth above which 95 % of the fines lie",
-        "invasion_depth_p95_m",
-        lambda entry: entry.number("invasion_depth_p95_m"),
-        lambda text: converted(text, "_mm") / 1e3,
-    ),
-    "k_loss": Goal(
-        "permeability lost", "k_reduction", lambda entry: entry.number("k_reduction"), share_of
-    ),
-    "bridging": Goal(
-        *("share of the fines that pass through the specimen unbridged", "passed_fraction"),
-        *(_passed, share_of),
-    ),
+GOALS: Mapping[str, tuple[str, Callable[[str], float]]] = {
+    "depth": ("invasion_depth_p95_m", lambda text: converted(text, "_mm") / 1e3),
+    "k_loss": ("k_reduction", share_of),
+    "bridging": (PASSED, share_of),
 }
+"""Targets of a design, the largest values that are accepted: quantity, and SI from a text."""
 
 
 class Verdict(NamedTuple):
     """How a mud stands against one target, and the seeds expected to decide an open one."""
 
-    goal: Goal
+    quantity: str
     limit: float
     band: Band
     state: str
@@ -511,7 +484,7 @@ def read_targets(targets: Mapping[str, Any]) -> dict[str, float]:
         if name not in GOALS:
             raise CaseError(f"targets.{name}: unknown, expected some of {', '.join(GOALS)}")
         try:
-            limits[name] = GOALS[name].read(str(text))
+            limits[name] = GOALS[name][1](str(text))
         except ValueError as error:
             raise CaseError(f"targets.{name}: {text!r}: {error}") from error
     if not limits:
@@ -531,11 +504,10 @@ def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[Cand
 
 
 def _verdict(comparison: Comparison, name: str, target: str, limit: float) -> Verdict:
-    goal = GOALS[target]
-    values = [v for run in comparison.of_variant(name) if (v := goal.of_run(run)) is not None]
-    band = student_band(values).within(*comparison.bounds(goal.quantity))
+    quantity = GOALS[target][0]
+    values, band = comparison.values(name, quantity).values(), comparison.band(name, quantity)
     state = MET if band.high <= limit else MISSED if band.low > limit else OPEN
     gap = abs(band.mean - limit)
     decidable = state == OPEN and len(values) > 1 and gap > 0
-    needed = seeds_for_width(values, gap, MOST_SEEDS) if decidable else None
-    return Verdict(goal, limit, band, state, needed)
+    needed = seeds_for_width(list(values), gap, MOST_SEEDS) if decidable else None
+    return Verdict(quantity, limit, band, state, needed)
