@@ -105,7 +105,7 @@ def answers(rows: Sequence[Row]) -> list[Answer]:
                     expected=formula,
                     measured=f"off by {100 * first:.2g} % and {100 * second:.2g} %",
                     holds=max(first, second) < TOLERANCE,
-                    test="tests/dem/test_contact_laws.py",
+                    test="tests/dem/test_contacts.py",
                 )
             )
     return lines

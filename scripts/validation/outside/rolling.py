@@ -172,7 +172,7 @@ def _resisted(rows: Sequence[Row]) -> list[Answer]:
                     measured=f"{worst.observed:.2g} g at {worst.value:g} degrees, the worst"
                     + (f": {percent_error(worst.error)}" if what == "rolls" else ""),
                     holds=abs(worst.error) < bound,
-                    test="tests/dem/test_contact_options.py",
+                    test="tests/dem/test_contacts.py",
                 )
             )
     return lines

@@ -50,6 +50,6 @@ def answers(rows: Sequence[Row]) -> list[Answer]:
             measured=f"within {100 * worst.error:.2g} % of v_T, worst of "
             f"{len(own)} drag schemes ({worst.value})",
             holds=worst.error < TOLERANCE,
-            test="tests/dem/test_physics.py",
+            test="tests/dem/test_motion.py",
         )
     ]

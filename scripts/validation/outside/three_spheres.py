@@ -17,7 +17,7 @@ NECKS: Mapping[str, Neck] = {
     LAMMPS: Neck(stiffness=1e4, shear_ratio=0.8235, step=1e-6),
 }
 TOLERANCE = 0.2
-_TEST = "tests/dem/test_neck.py"
+_TEST = "tests/dem/test_contacts.py"
 
 
 def points(quick: bool) -> list[Point]:
