@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import pyvista as pv
-from builders import told
+from builders import naming
 from report_demo import BOX, demo_analysis, demo_damaged, demo_grains, snapshot_of
 
 from fdnet.case.tables import AnalysisChoices
@@ -358,7 +358,7 @@ def test_tables_of_a_real_analysis_agree_with_each_other(tmp_path):
     for number, sides in enumerate(SIDES):
         folder_ = tmp_path / str(number)
         folder_.mkdir()
-        with told(sides):
+        with naming(sides):
             analysis = analysis_of(sides)
             sections = pd.read_csv(tables.write_sections(folder_ / "sections.csv", analysis))
             profile = pd.read_csv(tables.write_profile(folder_ / "profile.csv", analysis))
@@ -427,7 +427,7 @@ def test_plain_columns_are_in_the_given_unit(tmp_path):
     ):
         folder_ = tmp_path / str(number)
         folder_.mkdir()
-        with told(units, metres):
+        with naming(units, metres):
             path = csv_of(folder_, "x,y,z,radius\n1,2,-3,4e0\n")
             position, radius, kind = columns(path, units=units)
             assert position[0] == pytest.approx([metres, 2 * metres, -3 * metres], rel=1e-15)
@@ -493,7 +493,7 @@ BROKEN = {
 def test_every_malformed_table_is_refused_with_file_and_line(tmp_path):
     for name, (text, message) in BROKEN.items():
         path = csv_of(tmp_path, text)
-        with told(name), pytest.raises(CaseError) as caught:
+        with naming(name), pytest.raises(CaseError) as caught:
             read_csv(path, units="mm")
         assert str(caught.value).startswith(str(path)), name
         assert message in str(caught.value), name

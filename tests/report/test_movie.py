@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from builders import told
+from builders import naming
 from PIL import Image
 
 from fdnet import solve_flow
@@ -76,7 +76,7 @@ def test_what_makes_no_movie_leaves_no_file(tmp_path, monkeypatch):
     ):
         folder_ = tmp_path / str(number)
         folder_.mkdir()
-        with told(name, reason, said):
+        with naming(name, reason, said):
 
             def fail(*_, reason=reason, **__):
                 raise OSError(reason)
@@ -156,7 +156,7 @@ def test_a_cut_state_is_named_and_not_drawn_empty(copied, tmp_path, shown):
                 path.mkdir()
             else:
                 path.write_bytes(cut)
-            with told(len(kept), cut and len(cut)), pytest.raises(CaseError, match=path.name):
+            with naming(len(kept), cut and len(cut)), pytest.raises(CaseError, match=path.name):
                 movie_of(copied, tmp_path / "m.gif")
             if cut is None:
                 path.rmdir()

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from builders import told
+from builders import naming
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 from report_demo import demo_analysis, demo_damaged, demo_grains, snapshot_of
@@ -317,7 +317,7 @@ def test_numbers_as_a_reader_wants_them():
         (True, "True"),
         ("direct", "direct"),
     ]:
-        with told(value, text):
+        with naming(value, text):
             assert quantity(value) == text
 
 

@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from builders import tiny, told
+from builders import naming, tiny
 
 import fdnet
 from fdnet.cli import main
@@ -77,7 +77,7 @@ def test_a_folder_of_somebody_else_is_refused_whole(tmp_path, case, capsys):
         out = foreign(tmp_path / f"theirs {number}", name, text)
         before = content(out)
         for extra in ([], ["--force"], ["--resume"]):
-            with told(name, text, extra):
+            with naming(name, text, extra):
                 code, err = answer(capsys, "run", case, "--out", out, "--quiet", *extra)
                 assert code == 2
                 assert "holds no fdnet run" in err
@@ -95,6 +95,16 @@ def test_a_folder_of_ours_is_known_by_its_mark_or_its_content(tmp_path, case, ca
     assert answer(capsys, *pack)[0] == 0
     assert (out / ".fdnet-run").read_text().startswith("fdnet run folder")
     (out / ".fdnet-run").unlink()
+    assert answer(capsys, *pack)[0] == 0
+
+
+@pytest.mark.liggghts
+def test_half_written_files_of_a_killed_session_are_removed_at_the_next_start(
+    tmp_path, case, capsys
+):
+    out = tmp_path / "run"
+    pack = ["run", case, "--out", out, "--quiet", "--stages", "pack"]
+    assert answer(capsys, *pack)[0] == 0
     (out / "figures").mkdir()
     for name in (".sections.999.part.csv", "figures/.sections.12.part.png", "pack/.x.7.part"):
         (out / name).write_text("half")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import TINY, tiny, told
+from builders import TINY, naming, tiny
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
@@ -248,7 +248,7 @@ def test_what_is_no_finished_run_is_refused(copied, tmp_path):
     with pytest.raises(CaseError, match=r"unfinished run; continue it with .* --resume"):
         fdnet.open_run(copied)
     for stages in (("pack",), ("analyse", "rest"), "analyse", ()):
-        with told(stages), pytest.raises(CaseError, match="with analyse or report among them"):
+        with naming(stages), pytest.raises(CaseError, match="with analyse or report among them"):
             fdnet.run_case(tiny(), tmp_path / "new", stages=stages)
     assert not (tmp_path / "new").exists()
 
@@ -290,13 +290,13 @@ def test_damaged_records_and_tables_are_refused_with_what_to_do(run, tmp_path):
         path = folder / name
         whole = path.read_bytes()
         path.write_text(change(path.read_text()))
-        with told(name, message), pytest.raises(CaseError, match=message) as caught:
+        with naming(name, message), pytest.raises(CaseError, match=message) as caught:
             read(folder)
         assert name in str(caught.value)
         path.write_bytes(whole)
     for name in ("pores", "layers", "history"):
         (folder / f"{name}.csv").rename(folder / "away")
-        with told(name), pytest.raises(CaseError, match=rf"{name}\.csv"):
+        with naming(name), pytest.raises(CaseError, match=rf"{name}\.csv"):
             getattr(fdnet.open_run(folder), name)
         (folder / "away").rename(folder / f"{name}.csv")
     assert fdnet.open_run(folder).summary == run.summary
@@ -403,7 +403,7 @@ def test_a_changed_file_of_a_stage_is_refused(run, copied, how):
         if what == "the dump gone" and how == "finished":
             assert run_stages(run.case, options(copied)), "dumps may be removed"
         else:
-            with told(what), pytest.raises(FdnetError, match=path.name):
+            with naming(what), pytest.raises(FdnetError, match=path.name):
                 run_stages(run.case, options(copied, **changes))
         path.write_bytes(whole)
 
@@ -413,7 +413,7 @@ def test_a_changed_table_of_a_finished_run_is_refused(run, copied):
         path = copied / name
         text = path.read_text()
         path.write_text(text.replace("1", "2", 1))
-        with told(name), pytest.raises(CaseError, match=rf"{path.name}: {ANEW}"):
+        with naming(name), pytest.raises(CaseError, match=rf"{path.name}: {ANEW}"):
             run_stages(run.case, options(copied))
         path.write_text(text)
 
@@ -431,7 +431,7 @@ def test_records_whose_digests_or_ranks_are_missing_or_odd_are_refused(run, copi
         text = path.read_text()
         record = {k: v for k, v in json.loads(text).items() if k != key}
         path.write_text(json.dumps(record if value is None else record | {key: value}))
-        with told(name, key, value), pytest.raises(CaseError, match=message):
+        with naming(name, key, value), pytest.raises(CaseError, match=message):
             run_stages(run.case, options(copied, resume=True))
         path.write_text(text)
 

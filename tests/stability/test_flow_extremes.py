@@ -5,7 +5,7 @@ Conductances over many decades, blocked sections, a single path, islands.
 
 import numpy as np
 import pytest
-from builders import told
+from builders import naming
 
 from fdnet.errors import FlowError
 from fdnet.network.flow.flow import INLET, OUTLET, Flow, solve_flow
@@ -49,7 +49,7 @@ def exact_inflow(network: Network, conductance: Array, flow: Flow) -> float:
 
 def test_conductances_from_0_over_sixteen_decades_against_rational_arithmetic():
     for decades in [0, 8, 16]:
-        with told(decades):
+        with naming(decades):
             flowing = 0
             for seed in range(12):
                 network, g = random_pores(seed, decades=decades)
@@ -64,7 +64,7 @@ def test_conductances_from_0_over_sixteen_decades_against_rational_arithmetic():
 
 def test_the_unit_of_conductance_does_not_matter():
     for unit in [1e-300, 1e-30, 1e16, 1e200]:
-        with told(unit):
+        with naming(unit):
             network, g = random_pores(3, decades=6)
             assert solve_flow(network, unit * g).inflow == pytest.approx(
                 unit * solve_flow(network, g).inflow, rel=1e-9
@@ -73,7 +73,7 @@ def test_the_unit_of_conductance_does_not_matter():
 
 def test_one_bad_conductance_among_many_is_refused_and_named():
     for bad in [np.nan, np.inf, -1.0, -1e-300]:
-        with told(bad):
+        with naming(bad):
             network, g = random_pores(3, decades=6)
             g[7] = bad
             with pytest.raises(FlowError, match="throat 7"):
@@ -133,7 +133,7 @@ def shortest_path(network: Network, conductance: Array) -> list[int]:
 def test_a_single_open_way_is_its_throats_in_series():
     """1/g = sum of 1/g_i, the same flux through each, nothing elsewhere."""
     for decades in [0.0, 16.0]:
-        with told(decades):
+        with naming(decades):
             network, clean = pack_network()
             path = shortest_path(network, clean)
             assert len(path) > 3

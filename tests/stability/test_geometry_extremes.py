@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from builders import told
+from builders import naming
 
 from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import NetworkError
@@ -76,7 +76,7 @@ def test_lattice_does_not_feel_a_shake_of_1e_12():
     The void is that of the closed form.
     """
     for periodic, name in itertools.product([ALL, NONE], LATTICES):
-        with told(periodic, name):
+        with naming(periodic, name):
             pack, porosity = LATTICES[name]
             still, moved = (measure(one, periodic=periodic) for one in (pack, shaken(pack, 1e-12)))
             assert moved.k_initial == pytest.approx(still.k_initial, rel=1e-6)
@@ -89,9 +89,8 @@ def test_lattice_does_not_feel_a_shake_of_1e_12():
 
 def test_damage_of_a_lattice_depends_on_the_split_by_less_than_documented():
     """0.7 % in SC with 150 fines by `section-archie` (docs/physics_network.md, section 2)."""
-    for name in LATTICES:
-        with told(name):
-            pack, _ = LATTICES[name]
+    for name, (pack, _) in LATTICES.items():
+        with naming(name):
             filled = with_fines(pack, 150, 0.1)
             fines = filled.fines()
             moved = shaken(pack, 1e-12)
@@ -111,7 +110,7 @@ def test_slivers_of_every_thickness_leave_k_continuous():
     of several tetrahedra, which stand alone once they are shaken: their nodes then move.
     """
     for name, size in itertools.product(LATTICES, [1e-10, 1e-7, 1e-5, 1e-3]):
-        with told(name, size):
+        with naming(name, size):
             pack, porosity = LATTICES[name]
             still, moved = measure(pack, periodic=ALL), measure(shaken(pack, size), periodic=ALL)
             assert moved.k_initial == pytest.approx(
@@ -144,7 +143,7 @@ def test_one_random_layer_is_half_of_its_periodic_double():
 def test_a_box_thinner_than_a_grain_between_planes_of_symmetry_is_the_lattice():
     """Half a cell, from the plane through the centres to that between them: one radius thick."""
     for axis in [0, 1, 2]:
-        with told(axis):
+        with naming(axis):
             lattice = simple_cubic()
             centred = snapshot(
                 lattice.position + np.where(np.arange(3) == axis, -0.2, 0.8), 1.0, lattice.box
@@ -161,7 +160,7 @@ def test_a_box_thinner_than_a_grain_between_planes_of_symmetry_is_the_lattice():
 
 def test_a_slice_of_a_grain_has_a_k_or_is_refused():
     for thickness in [0.3, 0.05, 1e-3]:
-        with told(thickness):
+        with naming(thickness):
             pack = random_pack(60)
             box = pack.box.copy()
             box[0] = [1.0, 1.0 + thickness]
@@ -178,7 +177,7 @@ def test_a_slice_of_a_grain_has_a_k_or_is_refused():
 def test_a_periodic_side_far_thinner_than_a_grain_is_refused_at_once():
     """Its images would be thousands; a tessellation of them took hours."""
     for thickness in [3e-3, 1e-5]:
-        with told(thickness):
+        with naming(thickness):
             pack = random_pack(60)
             with pytest.raises(
                 NetworkError, match=r"periodic side y .* are needed, expected at most"
@@ -203,7 +202,7 @@ def test_fines_of_every_size_ratio_are_all_seen_and_lower_k():
     The drop of porosity is their volume over that of the box.
     """
     for ratio in [2, 5, 10, 20, 40]:
-        with told(ratio):
+        with naming(ratio):
             pack = random_pack(60, 0.5)
             radius = 1.0 / ratio
             filled = with_fines(pack, min(20 * ratio, 500), radius)
@@ -285,7 +284,7 @@ def test_fines_larger_than_every_throat_close_a_lattice():
     fine that covers a section blocks it); smaller fines leave a path.
     """
     for radius, open_path in [(0.40, True), (0.43, False), (0.70, False)]:
-        with told(radius, open_path):
+        with naming(radius, open_path):
             lattice = simple_cubic()
             analysis = measure(
                 lattice, joined(lattice, cubic_pores(), radius), ALL, ("thesis", "thesis")
@@ -306,7 +305,7 @@ def test_fines_that_fill_the_pack_leave_no_k():
     Fines at random places leave exp(-n v / V) of the void (Boolean model, Matheron 1975).
     """
     for law in ["thesis", "section-archie"]:
-        with told(law):
+        with naming(law):
             pack = random_pack(40)
             rng = np.random.default_rng(1)
             fines = rng.random((4000, 3)) * pack.box[:, 1]
@@ -333,7 +332,7 @@ def test_a_fine_wider_than_a_periodic_side_is_refused_at_once():
 def test_a_grain_that_is_there_twice_counts_once():
     """Also as its own image, one period away along y."""
     for apart in [(0, 0, 0), (1e-12, 0, 0), (5e-4, 0, 0), (0, 1, 0)]:
-        with told(apart):
+        with naming(apart):
             pack = random_pack(40)
             there = pack.position[:1] + np.array(apart) * [1, pack.box[1, 1], 1]
             analysis = measure(
@@ -372,7 +371,7 @@ def test_doubled_fines_take_up_their_place_once():
 def test_coordinates_far_from_the_origin_cost_digits_alone():
     """The moved pack against one at the origin with the same rounded differences."""
     for lengths, periodic in itertools.product([1e3, 1e6], [ALL, SIDES, NONE]):
-        with told(lengths, periodic):
+        with naming(lengths, periodic):
             pack = with_fines(random_pack(60), 30, 0.2)
             offset = np.round(lengths * pack.box[0, 1]) * np.array([1.0, -1.0, 1.0])
             far, box = pack.position + offset, pack.box + offset[:, None]
@@ -385,7 +384,7 @@ def test_coordinates_far_from_the_origin_cost_digits_alone():
 
 def test_coordinates_that_have_lost_their_digits_are_refused():
     for lengths in [1e9, 1e12, 1e17]:
-        with told(lengths):
+        with naming(lengths):
             pack = random_pack(60)
             offset = lengths * pack.box[0, 1]
             with pytest.raises(NetworkError, match="move the specimen to the origin"):

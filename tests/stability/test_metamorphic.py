@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from builders import told
+from builders import naming
 
 from fdnet.cli import main
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
@@ -153,7 +153,7 @@ def test_another_description_of_the_same_pack_gives_its_permeability(tmp_path, c
             for name in names:
                 if name == "doubled" and "y" not in periodic:
                     continue  # two walled packs side by side are another pack
-                with told(name, spread, damage_law):
+                with naming(name, spread, damage_law):
                     other = permeability(CHANGES[name](pack), tmp_path, capsys, *law)
                     assert other[0] == pytest.approx(intact, rel=ROUNDING)
                     assert other[1] == pytest.approx(damaged, rel=rounding)

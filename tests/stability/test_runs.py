@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import tomli_w
-from builders import TINY, told
+from builders import TINY, naming
 
 from fdnet.case.file import read_case, set_keys
 from fdnet.cli import main
@@ -162,7 +162,7 @@ def test_what_cannot_be_is_refused_before_anything_is_written(tmp_path):
     ):
         folder_ = tmp_path / str(number)
         folder_.mkdir()
-        with told(assignments, message):
+        with naming(assignments, message):
             code, _, err = run(folder_, *assignments)
             assert code == 2
             assert message in err

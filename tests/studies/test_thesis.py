@@ -58,9 +58,7 @@ def ball(radius):
 
 @pytest.fixture(scope="module")
 def state():
-    case = tiny(
-        "box.size_mm=[2.2,2.0,2.0]", "box.sides=periodic", "analysis.sections=2"
-    )
+    case = tiny("box.size_mm=[2.2,2.0,2.0]", "box.sides=periodic", "analysis.sections=2")
     box = MM * np.array([[0.0, 2.2], [0.0, 2.0], [0.0, 2.0]])
     x, side = 0.35 + A * np.arange(4), A * np.arange(4)
     place = MM * np.stack(np.meshgrid(x, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
