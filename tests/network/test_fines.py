@@ -448,16 +448,6 @@ def test_the_weighted_volume_of_a_sphere_is_that_of_many_points():
             assert found == pytest.approx(np.mean(weight * inside), rel=2e-3, abs=1e-3)
 
 
-def test_a_lone_fine_has_porosity_one_in_the_mud_next_to_a_grain_and_at_a_wall():
-    beside = spheres([[0.5, 0.5, 0.5]], 0.2, Kind.GRAIN).joined(spheres([[0.5, 0.5, 0.71]], 0.01))
-    for pack, sides in [
-        (spheres([[-3.0, 0.5, 0.5]], 0.01), CROSSWISE),
-        (beside, CROSSWISE),
-        (spheres([[0.5, 0.012, 0.013]], 0.01), NONE),
-    ]:
-        assert local_porosity(pack, sides).porosity == pytest.approx(1.0, rel=1e-12)
-
-
 def test_dilute_fines_have_the_porosity_of_the_suspension():
     """Random places without overlap at a fraction of 0.02: the mean must be 0.98."""
     rng, radius, placed = np.random.default_rng(5), 0.02, np.empty((0, 3))
@@ -470,6 +460,13 @@ def test_dilute_fines_have_the_porosity_of_the_suspension():
     near = local_porosity(spheres(placed, radius), CROSSWISE)
     inner = np.abs(placed[:, 0] - 0.5) < 0.42
     assert float(np.mean(near.porosity[inner])) == pytest.approx(0.98, abs=0.004)
+    beside = spheres([[0.5, 0.5, 0.5]], 0.2, Kind.GRAIN).joined(spheres([[0.5, 0.5, 0.71]], 0.01))
+    for pack, sides in [  # a lone fine in the mud, next to a grain and at a wall
+        (spheres([[-3.0, 0.5, 0.5]], 0.01), CROSSWISE),
+        (beside, CROSSWISE),
+        (spheres([[0.5, 0.012, 0.013]], 0.01), NONE),
+    ]:
+        assert local_porosity(pack, sides).porosity == pytest.approx(1.0, rel=1e-12)
 
 
 def test_a_grain_takes_space_and_leaves_the_crowd_beside_it_its_own_porosity():
@@ -484,18 +481,12 @@ def test_a_grain_takes_space_and_leaves_the_crowd_beside_it_its_own_porosity():
     seen = float(np.mean(local_porosity(both, CROSSWISE).porosity[at_grain]))
     assert own < seen < own + 0.12, "fines that the grain cut are gone"
     assert float(np.mean(local_porosity(fines, CROSSWISE).porosity[at_grain])) > seen + 0.03
-
-
-def test_periods_mixtures_and_crushed_crowds():
-    place = bed(0.1)
-    near = local_porosity(spheres(place, 0.049), CROSSWISE)
-    assert np.ptp(near.porosity[np.abs(place[:, 0] - 0.5) < 0.1]) < 1e-9
-    # a small fine touching a large one: d32 of both, weighted by what lies in the ball
-    near = local_porosity(
-        spheres([[0.5, 0.5, 0.5], [0.53, 0.5, 0.5]], np.array([0.01, 0.02])), CROSSWISE, reach=20.0
-    )
+    whole = local_porosity(spheres(place, 0.49 * spacing), CROSSWISE).porosity
+    assert np.ptp(whole[np.abs(place[:, 0] - 0.5) < 0.1]) < 1e-9, "across periodic sides"
+    crushed = local_porosity(spheres(place, 0.035), CROSSWISE)  # pressed into each other
+    assert crushed.capped > 0
+    assert crushed.porosity.min() == pytest.approx(1 - DENSEST, rel=1e-12)
+    pair = spheres([[0.5, 0.5, 0.5], [0.53, 0.5, 0.5]], np.array([0.01, 0.02]))
+    near = local_porosity(pair, CROSSWISE, reach=20.0)  # d32 of both, by what lies in the ball
     sauter = (0.01**3 + 0.02**3) / (0.01**2 + 0.02**2)
     assert near.size_ratio == pytest.approx(np.array([0.01, 0.02]) / sauter, rel=0.03)
-    near = local_porosity(spheres(bed(0.05), 0.035), CROSSWISE)  # pressed into each other
-    assert near.capped > 0
-    assert near.porosity.min() == pytest.approx(1 - DENSEST, rel=1e-12)

@@ -447,16 +447,10 @@ def test_a_node_is_the_point_of_its_tetrahedron_nearest_to_the_power_centre():
     place = node[network.throat_pores] + shift * np.ptp(network.box, axis=1)
     apart = np.einsum("tsk,tk->ts", place - corner[:, :1], normal)
     assert height == pytest.approx(np.abs(apart), abs=1e-9)
+    cubic = build_network(simple_cubic(), periodic=ALL)  # its cells keep their one centre
+    assert np.all(nodes_of(cubic).position == cubic.pore_power_centre)
     still = ~moved[network.throat_pores]
     assert np.all(height[still] == network.throat_heights[still])
-
-
-def test_pores_of_one_polyhedron_keep_its_power_centre():
-    """The cells of a cubic lattice are split into tetrahedra with one centre outside of some."""
-    cubic = build_network(simple_cubic(), periodic=ALL)
-    nodes = nodes_of(cubic)
-    assert np.all(nodes.position == cubic.pore_power_centre)
-    assert np.all(nodes.heights == cubic.throat_heights)
 
 
 def test_nodes_follow_the_spheres_without_a_jump():
