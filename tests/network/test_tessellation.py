@@ -12,8 +12,6 @@ from scipy.spatial import ConvexHull, Delaunay
 
 from fdnet.errors import NetworkError
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.flow.sections import whole_permeability
-from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
@@ -288,21 +286,6 @@ def test_no_other_grain_has_less_power_at_a_power_centre():
     assert least == pytest.approx(own - network.pore_corner_radius[:, 0] ** 2, abs=1e-9)
 
 
-def test_equal_radii_make_the_network_of_delaunay(monkeypatch):
-    for periodic in (ALL, (False, True, False)):
-        plain = built(120, 0.58, periodic)
-        with monkeypatch.context() as patch:
-            patch.setattr(delaunay, "EQUAL_SPREAD", -1.0)
-            power = build_network(random_pack(120), periodic=periodic, walls="slip")
-        # prisms cut by a wall may be split otherwise
-        for name in ("pore_volume", "throat_radius", "throat_heights") if all(periodic) else ():
-            one, two = (np.sort(getattr(network, name).ravel()) for network in (plain, power))
-            assert one == pytest.approx(two, abs=1e-6)
-        for law in LAWS.values():
-            one, two = (solve_flow(network, law(network)).inflow for network in (plain, power))
-            assert two == pytest.approx(one, rel=1e-6)
-
-
 def test_the_network_does_not_depend_on_who_tessellates(monkeypatch):
     """Nor where the compiled tessellation finds the points degenerate: Qhull then takes over."""
     for spread, periodic in product((0.0, 0.3), ("xyz", "")):
@@ -451,14 +434,3 @@ def test_a_node_is_the_point_of_its_tetrahedron_nearest_to_the_power_centre():
     assert np.all(nodes_of(cubic).position == cubic.pore_power_centre)
     still = ~moved[network.throat_pores]
     assert np.all(height[still] == network.throat_heights[still])
-
-
-def test_nodes_follow_the_spheres_without_a_jump():
-    """A shift of all grains by 1e-7 of a radius, each its own way, moves k by little."""
-    pack, rng = random_pack(60), np.random.default_rng(5)
-    shaken = replace(pack, position=pack.position + rng.uniform(-1e-7, 1e-7, pack.position.shape))
-    k = [
-        whole_permeability(one, 1.0 / half_resistances(one).sum(axis=1))[0]
-        for one in (build_network(spheres, periodic=ALL) for spheres in (pack, shaken))
-    ]
-    assert k[1] == pytest.approx(k[0], rel=1e-4)
