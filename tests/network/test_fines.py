@@ -67,8 +67,8 @@ def test_pieces_of_a_ball_in_closed_form():
     for angle in (1e-6, 0.3, 1.2, 3.0):  # a wedge through the centre
         side = [50 * np.cos(angle), 50 * np.sin(angle), 0]
         share = angle / (2 * np.pi)
-        found = piece([[0, 0, -50], [0, 0, 50], [50, 0, 0], side], [0, 0, 0])
-        assert found == pytest.approx((share * BALL, share * SPHERE), rel=1e-9), angle
+        got = piece([[0, 0, -50], [0, 0, 50], [50, 0, 0], side], [0, 0, 0])
+        assert got == pytest.approx((share * BALL, share * SPHERE), rel=1e-9), angle
     for height in (0.0, 0.3, -1e-12):  # a flat tetrahedron holds nothing
         square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
         assert piece(square, [0.4, 0.5, height], 0.5) == (0.0, 0.0)
@@ -219,8 +219,8 @@ def test_the_estimate_of_two_planes_over_the_exact_volume():
         (2.0, 1.25, 0.859),
     ]:
         pair = pairs_of([sphere, offset, 50.0, 1.0, 100.0])
-        found = two_plane_volume(pair)[0] / exact_volume(pair)[0]
-        assert found == pytest.approx(ratio, abs=1.5e-3), (sphere, offset)
+        got = two_plane_volume(pair)[0] / exact_volume(pair)[0]
+        assert got == pytest.approx(ratio, abs=1.5e-3), (sphere, offset)
     whole, outside = pairs_of([0.3, 0.6, 1.0, 1.0, 3.0]), pairs_of([0.3, 1.4, 1.0, 1.0, 3.0])
     assert [two_plane_volume(whole)[0], exact_volume(whole)[0]] == pytest.approx(
         [BALL * 0.027] * 2
@@ -404,8 +404,8 @@ def test_the_cake_is_what_hangs_together_from_the_grains_on():
     row = [[-0.1, 2, 2], [-0.3, 2, 2], [-0.5, 2, 2]]
     assert cake_thickness([*row, [-0.75, 2, 2]]) == pytest.approx(0.6), "the fourth lies apart"
     for gap, thickness in ((0.0019, 0.4019), (0.0021, 0.2)):
-        found = cake_thickness([[-0.1, 2, 2], [-0.3 - gap, 2, 2]])
-        assert found == pytest.approx(thickness), gap
+        got = cake_thickness([[-0.1, 2, 2], [-0.3 - gap, 2, 2]])
+        assert got == pytest.approx(thickness), gap
     assert cake_thickness([[0.05, 0.5, 0.5], [-0.15, 0.5, 0.5]]) == pytest.approx(0.25)
     assert cake_thickness([[-0.5, 2, 2], [-0.7, 2, 2]]) == cake_thickness([]) == 0.0
     sides = (False, True, True)
@@ -444,8 +444,8 @@ def test_the_weighted_volume_of_a_sphere_is_that_of_many_points():
     for distance in (0.0, 0.3, 0.8, 1.4, 2.2):
         for radius in (0.5, 1.0, 2.0):
             inside = np.sum((step - [distance, 0, 0]) ** 2, axis=1) < radius**2
-            found = weighted_volume(radius, distance, ball)
-            assert found == pytest.approx(np.mean(weight * inside), rel=2e-3, abs=1e-3)
+            got = weighted_volume(radius, distance, ball)
+            assert got == pytest.approx(np.mean(weight * inside), rel=2e-3, abs=1e-3)
 
 
 def test_dilute_fines_have_the_porosity_of_the_suspension():

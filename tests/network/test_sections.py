@@ -114,9 +114,9 @@ def test_the_widening_of_an_open_section():
     """
     shares = {0.2: 0.58, 0.3: 0.64, 0.4: 0.65, 0.5: 0.63, 0.6: 0.59, 0.7: 0.52}
     for narrow, share in shares.items():
-        found = sideways(narrow)
-        assert found == pytest.approx(share * wedges.WIDENING / 2.0, rel=0.01), narrow
-        assert found == pytest.approx(wedges.OPEN_WIDENING / 2.0, rel=0.13), narrow
+        got = sideways(narrow)
+        assert got == pytest.approx(share * wedges.WIDENING / 2.0, rel=0.01), narrow
+        assert got == pytest.approx(wedges.OPEN_WIDENING / 2.0, rel=0.13), narrow
 
 
 # ------------------------------------------------------------------------------------------------

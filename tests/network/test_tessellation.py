@@ -270,10 +270,10 @@ def test_power_centres_of_a_body_centred_lattice_of_two_sizes():
     place, radius = np.vstack([steps, steps + 0.5 * edge]), np.repeat([corner, centre], 27)
     network = build_network(snapshot(place, radius, [[0.0, 3 * edge]] * 3), periodic=ALL)
     turned = network.pore_power_centre % edge
-    found = np.sort(np.minimum(turned, edge - turned), axis=1)
+    got = np.sort(np.minimum(turned, edge - turned), axis=1)
     expected = np.sort([edge / 2, edge / 4 + (corner**2 - centre**2) / edge, 0.0])
-    assert found == pytest.approx(np.tile(expected, (len(found), 1)), abs=1e-9)
-    assert len(found) == 12 * 27
+    assert got == pytest.approx(np.tile(expected, (len(got), 1)), abs=1e-9)
+    assert len(got) == 12 * 27
 
 
 def test_no_other_grain_has_less_power_at_a_power_centre():
