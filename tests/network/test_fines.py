@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from overlap import Sphere, Tetrahedron, overlap_area, overlap_volume
 from scipy.integrate import quad
-from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
 from fdnet.errors import CaseError
@@ -16,10 +15,8 @@ from fdnet.network.fines.deposit import (
     clip_to_box,
     deposit_in_pores,
     holders_of,
-    images_near,
     measured_deposit,
     pieces,
-    points_in_boxes,
     reaching_inside,
 )
 from fdnet.network.fines.occupancy import (
@@ -112,21 +109,6 @@ def test_pieces_against_the_other_decomposition_of_the_package_overlap():
         volume, surface = piece(corner, centre, radius)
         assert volume / radius**3 == pytest.approx(overlap_volume(ball, tetrahedron), abs=1e-10)
         assert surface / radius**2 == pytest.approx(overlap_area(ball, tetrahedron)[0], abs=1e-9)
-
-
-def test_every_point_is_met_in_every_box_once():
-    for stretch in ([1, 1, 1], [10, 1, 0], [1e-9, 0, 0], [0, 0, 0]):
-        rng = np.random.default_rng(2)
-        point = rng.random((300, 3)) * stretch
-        low = (rng.random((50, 3)) * 1.6 - 0.3) * stretch
-        high = low + rng.random((50, 3)) * np.array(stretch) * 0.6
-        box, index = points_in_boxes(point, low, high)
-        every = np.argwhere(np.all((point >= low[:, None]) & (point <= high[:, None]), axis=2))
-        assert sorted(zip(box, index, strict=True)) == [tuple(pair) for pair in every], stretch
-        assert np.all(np.diff(box) >= 0)
-    empty = np.zeros((0, 3))
-    assert len(points_in_boxes(empty, np.zeros((2, 3)), np.ones((2, 3)))[0]) == 0
-    assert len(points_in_boxes(np.ones((2, 3)), empty, empty)[1]) == 0
 
 
 def test_parts_of_tetrahedra_in_a_box():
@@ -335,29 +317,6 @@ def test_a_fine_in_one_pore_against_random_points():
     inside = np.linalg.norm(share @ corner - place, axis=1) < 0.7
     expected = inside.mean() * network.pore_tetra_volume[pore]
     assert volume == pytest.approx(expected, rel=4 / np.sqrt(inside.sum()))
-
-
-def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them():
-    box = np.array([[0.0, 5.0], [1.0, 5.0], [-2.0, 4.0]])
-    position = box[:, 0] + np.random.default_rng(9).random((200, 3)) * np.ptp(box, axis=1)
-    low, high = box[:, 0] - 1.5, box[:, 1] + 1.2
-    for walls in ([0], [1], [1, 2], [0, 1, 2]):
-        sides = tuple(axis not in walls for axis in range(3))
-        network = replace(chain(1), box=box, periodic=sides)
-        images, owner = images_near(network, position, low, high, 0.3)
-        doubled, period = position, np.ptp(box, axis=1)
-        for axis in walls:
-            flipped = np.where(np.arange(3) == axis, 2 * box[axis, 1] - doubled, doubled)
-            doubled = np.concatenate([doubled, flipped])
-            period = period * np.where(np.arange(3) == axis, 2.0, 1.0)
-        steps = (np.indices((3, 3, 3)).reshape(3, -1, 1).transpose(1, 2, 0) - 1) * period
-        near, expected = (
-            places[np.all((places >= low - 0.3) & (places <= high + 0.3), axis=1)]
-            for places in (images, (doubled + steps).reshape(-1, 3))
-        )
-        assert len(near) == len(expected) > 300, walls
-        assert cKDTree(near).query(expected)[0].max() < 1e-12, walls
-        assert np.array_equal(np.unique(owner), np.arange(200))
 
 
 def test_fines_that_come_leave_and_move_give_the_full_measure():
