@@ -291,14 +291,14 @@ def test_what_the_answer_rests_on_is_in_it(tmp_path, answer, numbers):
 def test_doubtful_packs_are_told_of(tmp_path, numbers):
     """Side walls that cut spheres, overlaps, k that no packing has, walls called periodic."""
 
-    def told(path, text, *arguments):
+    def warns(path, text, *arguments):
         said = numbers(path, *arguments)["warnings"]
         return any(one.startswith(text) for one in said)
 
     path, sides = cubic(tmp_path / "sc.csv"), ("--box", "0,4,0.1,3.9,0,4")
     text = "32 of 64 spheres cross the side walls; if the pack is periodic give --periodic y"
-    assert told(path, text, *sides)
-    assert not told(path, "32 of 64 spheres cross", *sides, "--periodic", "y")
+    assert warns(path, text, *sides)
+    assert not warns(path, "32 of 64 spheres cross", *sides, "--periodic", "y")
     every = ("--periodic", "xyz", "--box")
     for box, doubted in ((FOUR, False), ("0,4,0,8,0,8", True)):  # a channel of 4 mm beside it
         said = numbers(path, *every, box)["warnings"]
@@ -306,8 +306,8 @@ def test_doubtful_packs_are_told_of(tmp_path, numbers):
     # spheres of 0.525 at a spacing of 1 overlap by 0.05 / 1.05 = 4.8 % of a diameter
     text = "grains overlap by up to 4.8 % of a diameter: the pack is denser than rigid spheres get"
     one = table(tmp_path / "cell.csv", [(0.5, 0.5, 0.5, 0.525)])
-    assert told(cubic(path, radius=0.525), text, *every, FOUR)
-    assert told(one, text, *every, "0,1,0,1,0,1")
+    assert warns(cubic(path, radius=0.525), text, *every, FOUR)
+    assert warns(one, text, *every, "0,1,0,1,0,1")
     # close-packed layers between walls across y: the last does not fit on the first
     layer, rise = np.indices((4, 1, 4)).reshape(3, -1).T + 0.5, 0.5**0.5
     shifts = [(0, 0), (0.5, 0.5), (0, 0), (0.5, 0.5), (0.25, 0.6)]
@@ -316,7 +316,7 @@ def test_doubtful_packs_are_told_of(tmp_path, numbers):
     box = ("--box", f"0,4,0,{4 * rise + 1},0,4")
     for periodic, doubted in (("xyz", True), ("xz", False)):
         text = "no grain crosses the periodic sides y"
-        assert told(file, text, *box, "--periodic", periodic) == doubted
+        assert warns(file, text, *box, "--periodic", periodic) == doubted
 
 
 # ------------------------------------------------------------------------------------------------

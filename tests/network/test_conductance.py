@@ -200,18 +200,6 @@ def test_grains_alone_keep_the_law_of_grains_and_fines_are_marked(pack, network)
     assert abs(np.median(ratio)) < 0.3
 
 
-def test_more_steps_and_points_change_little(network, monkeypatch):
-    throats = np.flatnonzero(bounded_by_fines(network))
-    coarse = halves_of(network, throats)
-    monkeypatch.setattr(deposit, "DIVISIONS", 24)
-    more = halves_of(network, throats)
-    open_ = np.isfinite(coarse) & np.isfinite(more)
-    assert open_.mean() > 0.9
-    ratio = np.log(coarse[open_] / more[open_])
-    assert abs(np.median(ratio)) < 0.02
-    assert np.quantile(np.abs(ratio), 0.9) < 0.2
-
-
 def test_a_mirrored_periodic_pack_has_the_same_throats(pack):
     """The rays of a section start from no edge of it."""
     place = pack.position.copy()

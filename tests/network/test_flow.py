@@ -12,7 +12,6 @@ from fdnet.network.flow.solver import (
     MULTIGRID,
     Balances,
     balance_links,
-    cancelling_pressures,
     winding_groups,
 )
 from fdnet.network.laws.named import LAWS, effective_law
@@ -277,26 +276,6 @@ def test_chains_and_groups_sixteen_decades_apart():
     network = network_of(position, [(0, 1), (1, 2), (1, 3), (3, 4)], [[0, 2], [0, 3], [0, 1]])
     flow = solve_flow(network, np.array([1.0, 1.0, 1e-18, 1.0]))
     assert flow.pore_pressure[1:] == pytest.approx([0.5, 0.0, 0.5, 0.5], abs=1e-9)
-
-
-def test_only_a_closed_way_with_a_jump_winds():
-    """A triangle 0-1-2 and two pores joined to it.
-
-    A jump there and back closes no loop; three turns do, and parallel links with unlike jumps.
-    """
-    ends = np.array([(0, 1), (1, 2), (2, 0), (2, 3), (3, 4)])
-    for jumps, winds in [
-        ([0, 0, 0, 1, -1], False),
-        ([1, 0, -1, 0, 0], False),
-        ([1, 1, 1, 0, 0], True),
-    ]:
-        group, winding = winding_groups(ends, np.array(jumps, float), 5)
-        assert winding.all() == winding.any() == winds, jumps
-        assert len(set(group)) == 1
-    assert winding_groups(np.array([(0, 1), (0, 1)]), np.array([0.0, 1.0]), 2)[1].all()
-    ends, jump = np.array([(0, 1), (2, 1), (2, 3), (4, 5)]), np.array([1.0, 0.0, -2.0, 3.0])
-    height = cancelling_pressures(ends, jump, 6)  # takes up the jumps of a forest
-    assert (jump + height[ends[:, 0]] - height[ends[:, 1]]).tolist() == [0, 0, 0, 0]
 
 
 def test_contrasts_settle_or_are_refused(monkeypatch):

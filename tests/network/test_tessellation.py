@@ -12,8 +12,6 @@ from scipy.spatial import ConvexHull, Delaunay
 
 from fdnet.errors import NetworkError
 from fdnet.network.flow.flow import solve_flow
-from fdnet.network.flow.sections import whole_permeability
-from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
@@ -272,10 +270,10 @@ def test_power_centres_of_a_body_centred_lattice_of_two_sizes():
     place, radius = np.vstack([steps, steps + 0.5 * edge]), np.repeat([corner, centre], 27)
     network = build_network(snapshot(place, radius, [[0.0, 3 * edge]] * 3), periodic=ALL)
     turned = network.pore_power_centre % edge
-    found = np.sort(np.minimum(turned, edge - turned), axis=1)
+    got = np.sort(np.minimum(turned, edge - turned), axis=1)
     expected = np.sort([edge / 2, edge / 4 + (corner**2 - centre**2) / edge, 0.0])
-    assert found == pytest.approx(np.tile(expected, (len(found), 1)), abs=1e-9)
-    assert len(found) == 12 * 27
+    assert got == pytest.approx(np.tile(expected, (len(got), 1)), abs=1e-9)
+    assert len(got) == 12 * 27
 
 
 def test_no_other_grain_has_less_power_at_a_power_centre():
@@ -286,21 +284,6 @@ def test_no_other_grain_has_less_power_at_a_power_centre():
     own = np.sum((network.pore_power_centre - network.pore_corner[:, 0]) ** 2, axis=1)
     least = (away - np.repeat(pack.radius, 27) ** 2).min(axis=1)
     assert least == pytest.approx(own - network.pore_corner_radius[:, 0] ** 2, abs=1e-9)
-
-
-def test_equal_radii_make_the_network_of_delaunay(monkeypatch):
-    for periodic in (ALL, (False, True, False)):
-        plain = built(120, 0.58, periodic)
-        with monkeypatch.context() as patch:
-            patch.setattr(delaunay, "EQUAL_SPREAD", -1.0)
-            power = build_network(random_pack(120), periodic=periodic, walls="slip")
-        # prisms cut by a wall may be split otherwise
-        for name in ("pore_volume", "throat_radius", "throat_heights") if all(periodic) else ():
-            one, two = (np.sort(getattr(network, name).ravel()) for network in (plain, power))
-            assert one == pytest.approx(two, abs=1e-6)
-        for law in LAWS.values():
-            one, two = (solve_flow(network, law(network)).inflow for network in (plain, power))
-            assert two == pytest.approx(one, rel=1e-6)
 
 
 def test_the_network_does_not_depend_on_who_tessellates(monkeypatch):
@@ -447,24 +430,7 @@ def test_a_node_is_the_point_of_its_tetrahedron_nearest_to_the_power_centre():
     place = node[network.throat_pores] + shift * np.ptp(network.box, axis=1)
     apart = np.einsum("tsk,tk->ts", place - corner[:, :1], normal)
     assert height == pytest.approx(np.abs(apart), abs=1e-9)
+    cubic = build_network(simple_cubic(), periodic=ALL)  # its cells keep their one centre
+    assert np.all(nodes_of(cubic).position == cubic.pore_power_centre)
     still = ~moved[network.throat_pores]
     assert np.all(height[still] == network.throat_heights[still])
-
-
-def test_pores_of_one_polyhedron_keep_its_power_centre():
-    """The cells of a cubic lattice are split into tetrahedra with one centre outside of some."""
-    cubic = build_network(simple_cubic(), periodic=ALL)
-    nodes = nodes_of(cubic)
-    assert np.all(nodes.position == cubic.pore_power_centre)
-    assert np.all(nodes.heights == cubic.throat_heights)
-
-
-def test_nodes_follow_the_spheres_without_a_jump():
-    """A shift of all grains by 1e-7 of a radius, each its own way, moves k by little."""
-    pack, rng = random_pack(60), np.random.default_rng(5)
-    shaken = replace(pack, position=pack.position + rng.uniform(-1e-7, 1e-7, pack.position.shape))
-    k = [
-        whole_permeability(one, 1.0 / half_resistances(one).sum(axis=1))[0]
-        for one in (build_network(spheres, periodic=ALL) for spheres in (pack, shaken))
-    ]
-    assert k[1] == pytest.approx(k[0], rel=1e-4)
