@@ -83,18 +83,6 @@ def test_plates_carry_a_column_as_its_springs_in_series():
     assert tensor[0, 0] == pytest.approx(3e6 / 7 * 12 * R / (4 * R**2), rel=1e-6)
 
 
-def test_a_column_gives_way_under_the_flow_as_an_even_load_on_springs():
-    """Five grains, six springs k, a force F on each: the middle one moves by 9 F / 2 k."""
-    from validation.mechanics import displacement_under_flow
-
-    place = np.column_stack([(2 * np.arange(5) + 1) * R, np.full(5, R), np.full(5, R)])
-    box = np.array([[0, 10 * R], [0, 2 * R], [0, 2 * R]])
-    smooth = PackMaterial(normal=3e6, shear=1e-3)
-    force = 1e9 * 8 * R**3
-    moved = displacement_under_flow(resting(place, R, box), smooth, 1e9, periodic=(False,) * 3)
-    assert moved[2, 0] == pytest.approx(4.5 * force / 3e6, rel=1e-6)
-
-
 def test_a_random_pack_is_softer_than_its_affine_bound():
     result = elastic_of(random_pack(), SPRINGS, periodic=ALL)
     assert np.linalg.eigvalsh(result.affine - result.tensor).min() > -1e-6 * result.affine[0, 0]

@@ -4,14 +4,12 @@ import math
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 from packs import simple_cubic
 
 from fdnet.network.network import build_network
 from fdnet.run.bridging import OpenThroats, classes_of, open_throats, width_rows, wilsons_band
 from fdnet.spheres.snapshot import Snapshot
-from validation.bridging import pooled_classes
 
 
 def throats(ratio, clogged):
@@ -46,7 +44,7 @@ def test_wilsons_band(hits, trials, low, high):
     assert wilsons_band(hits, trials) == pytest.approx((low, high), abs=5e-5)
 
 
-def test_throats_fall_into_their_classes_and_runs_add_up():
+def test_throats_fall_into_their_classes():
     first = rows_of([0.15, 0.2, 0.29, 2.0], [0, 1, 0, 1], 0.1)
     assert [(row["ratio_lo"], row["ratio_hi"]) for row in first] == [
         (0.1, 0.2),
@@ -55,19 +53,6 @@ def test_throats_fall_into_their_classes_and_runs_add_up():
     ]
     assert [row["throats"] for row in first] == [1, 2, 1]
     assert [row["closed"] for row in first] == [0, 1, 1]
-    second = rows_of([0.25, 0.25], [1, 1], 0.1)
-    other = rows_of([0.25], [0], 0.2)
-    rows = pooled_classes([pd.DataFrame(one) for one in (first, second, other)])
-    assert [
-        (row["concentration"], row["ratio_lo"], row["throats"], row["closed"]) for row in rows
-    ] == [
-        (0.1, 0.1, 1, 0),
-        (0.1, 0.2, 4, 3),
-        (0.1, 1.5, 1, 1),
-        (0.2, 0.2, 1, 0),
-    ]
-    assert rows[1]["share_low"] < 0.75 < rows[1]["share_high"]
-    assert rows[1]["arrived_mean"] == 1.0
 
 
 def specimen(network, *, fine=0.0, held=None, blocked=None, left=1.0):
