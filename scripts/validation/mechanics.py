@@ -1,4 +1,4 @@
-"""The mechanics of packs: size, load steps, the same test in LIGGGHTS, and sand under stress.
+"""The mechanics of packs: size, the same test in LIGGGHTS, sand under stress, bonds in the flow.
 
     python scripts/validation.py mechanics [--quick] [--only NAME] [--out DIR] [--rows FILE.csv]
 
@@ -58,9 +58,6 @@ ITSELF = "fdnet itself"
 """Source of what is compared with a finer or larger form of the same."""
 QUARTZ = 9.43e7
 """Normal stiffness of quartz, 4 E R, N/m; 7.2e6 gives a pack the thesis's 4.8 GPa."""
-CEMENT = Cement(
-    radius_ratio=0.5, normal=2e10, shear=8e9, tensile_strength=1.2e5, shear_strength=1.2e5
-)
 
 
 def case_of(
@@ -85,16 +82,6 @@ def moduli(trial: Trial, *, sides: str) -> dict[str, float]:
     grains = packed(case, trial.folder.parent)
     result = elastic_of(grains, pack_material(case, grains), periodic=case.periodic).averaged
     return {"young": result.young, "shear": result.shear}
-
-
-def load_steps(trial: Trial, *, bonded: bool) -> dict[str, float]:
-    """Largest deviatoric stress, Pa, and volume strain of a test in so many load steps."""
-    case = case_of(trial.seed, 1.9, "periodic")
-    grains = packed(case, trial.folder.parent)
-    material = replace(pack_material(case, grains), cement=CEMENT if bonded else None)
-    test = Triaxial(confining=PRESSURE, strain=0.012, steps=int(trial.value))
-    result = triaxial(grains, material, test, periodic=case.periodic)
-    return {"peak": result.peak.deviatoric, "volume_strain": result.rows[-1].volume_strain}
 
 
 # ---- The triaxial test in LIGGGHTS: six smooth plates, whose stresses are held by servo.
@@ -260,17 +247,6 @@ def judge_moduli(rows: pd.DataFrame) -> list[Finding]:
             what = f"{name}: Young's, {edge:g} mm over {most:g} mm"
             lines.append(Finding(what, "1 ± 10 %", ITSELF, f"{share:.3f}", (share - 1) / 0.1))
     return lines
-
-
-def judge_steps(rows: pd.DataFrame) -> list[Finding]:
-    """The peak with fewer load steps over that with most."""
-    peak = rows[rows.quantity == "peak"].groupby("value")["observed"].mean()
-    if len(peak) < 2:
-        return []
-    few, most = sorted(peak.index)[-2:]
-    share = peak[few] / peak[most]
-    what = f"peak, {few:g} over {most:g} {rows.comparison.iloc[0]}"
-    return [Finding(what, "1 ± 2 %", ITSELF, f"{share:.3f}", (share - 1) / 0.02)]
 
 
 def judge_test(rows: pd.DataFrame) -> list[Finding]:
