@@ -7,7 +7,7 @@ damage law "auto" is meant, the rows are those of "all-spheres", which it takes 
 """
 
 import argparse
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from fdnet.files import path_option, replacing
 from fdnet.names import ALL_SPHERES, DEFAULT_LAW, SECTION_ARCHIE
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.sections import Section, whole_permeability
+from fdnet.network.flow.sections import whole_permeability
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.permeability import compare
@@ -129,19 +129,15 @@ def slab_row(slab: Slab) -> Row:
         "known_before": slab.known_before,
         "k_over_k0": slab.ratio,
     }
-    for pair, section in zip(ALL_PAIRS, _sections(spheres, slab.planes), strict=True):
+    edges = np.unique([*spheres.box[0], *slab.planes]).tolist()
+    laws = [(law, damage) for law, damage in (pair.split(" + ") for pair in ALL_PAIRS)]
+    results = compare(spheres, periodic="yz", sections=edges, laws=laws)
+    for pair, result in zip(ALL_PAIRS, results, strict=True):
+        section = next(one for one in result.sections if one.x_lo == slab.planes[0])
         row[f"{law_of(pair)}: k0"] = section.k_initial / slab.k0
         row[f"{pair}: k"] = section.k_damaged / slab.k
         row[pair] = section.k_damaged / section.k_initial / slab.ratio
     return row
-
-
-def _sections(spheres: Snapshot, planes: tuple[float, float]) -> Iterator[Section]:
-    """The section between the planes by each of `ALL_PAIRS`."""
-    edges = np.unique([*spheres.box[0], *planes]).tolist()
-    pairs = [(law, damage) for law, damage in (pair.split(" + ") for pair in ALL_PAIRS)]
-    for result in compare(spheres, periodic="yz", sections=edges, laws=pairs):
-        yield next(section for section in result.sections if section.x_lo == planes[0])
 
 
 def tables(folder: Path) -> str:
