@@ -191,16 +191,16 @@ def draw(folder: Path) -> None:
     import matplotlib.pyplot as plt
 
     cut = pd.read_csv(folder / SLABS)
-    figure, panels = plt.subplots(1, 2, figsize=(11, 4.8), sharey=True, constrained_layout=True)
+    figure, panels = plt.subplots(2, 1, figsize=(6.4, 7.2), constrained_layout=True)
     for axes, against in zip(panels, ("k_over_k0", THROATS), strict=True):
         for pair, colour, marker in ((ARCHIE, "#D55E00", "s"), (FINEST, "#0072B2", "o")):
-            error = 100.0 * (cut[pair] - 1.0)
-            axes.plot(cut[against], error, marker, ms=4, color=colour, alpha=0.7, label=pair)
+            error, law = 100.0 * (cut[pair] - 1.0), pair.split(" + ")[1]
+            axes.plot(cut[against], error, marker, ms=4, color=colour, alpha=0.7, label=law)
         axes.axhline(0.0, color="#1A1A1A", lw=0.8)
-        axes.set_xscale("log")
+        axes.set(xscale="log", ylabel="error of k/k0, %")
         axes.grid(lw=0.3)
     panels[1].axvline(FEW_THROATS, color="#1A1A1A", lw=0.8, ls=":")
-    panels[0].set(xlabel="k/k0 by resolved flow", ylabel="error of k/k0, %")
+    panels[0].set(xlabel="k/k0 by resolved flow")
     panels[1].set(xlabel="throats that carry the flow")
     panels[0].legend()
     with replacing(folder / FIGURE) as part:
