@@ -7,7 +7,7 @@ damage law "auto" is meant, the rows are those of "all-spheres", which it takes 
 """
 
 import argparse
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from fdnet.files import path_option, replacing
 from fdnet.names import ALL_SPHERES, DEFAULT_LAW, SECTION_ARCHIE
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.sections import Section, whole_permeability
+from fdnet.network.flow.sections import whole_permeability
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.permeability import compare
@@ -129,19 +129,15 @@ def slab_row(slab: Slab) -> Row:
         "known_before": slab.known_before,
         "k_over_k0": slab.ratio,
     }
-    for pair, section in zip(ALL_PAIRS, _sections(spheres, slab.planes), strict=True):
+    edges = np.unique([*spheres.box[0], *slab.planes]).tolist()
+    laws = [(law, damage) for law, damage in (pair.split(" + ") for pair in ALL_PAIRS)]
+    results = compare(spheres, periodic="yz", sections=edges, laws=laws)
+    for pair, result in zip(ALL_PAIRS, results, strict=True):
+        section = next(one for one in result.sections if one.x_lo == slab.planes[0])
         row[f"{law_of(pair)}: k0"] = section.k_initial / slab.k0
         row[f"{pair}: k"] = section.k_damaged / slab.k
         row[pair] = section.k_damaged / section.k_initial / slab.ratio
     return row
-
-
-def _sections(spheres: Snapshot, planes: tuple[float, float]) -> Iterator[Section]:
-    """The section between the planes by each of `ALL_PAIRS`."""
-    edges = np.unique([*spheres.box[0], *planes]).tolist()
-    pairs = [(law, damage) for law, damage in (pair.split(" + ") for pair in ALL_PAIRS)]
-    for result in compare(spheres, periodic="yz", sections=edges, laws=pairs):
-        yield next(section for section in result.sections if section.x_lo == planes[0])
 
 
 def tables(folder: Path) -> str:
@@ -195,16 +191,16 @@ def draw(folder: Path) -> None:
     import matplotlib.pyplot as plt
 
     cut = pd.read_csv(folder / SLABS)
-    figure, panels = plt.subplots(1, 2, figsize=(11, 4.8), sharey=True, constrained_layout=True)
+    figure, panels = plt.subplots(2, 1, figsize=(6.4, 7.2), constrained_layout=True)
     for axes, against in zip(panels, ("k_over_k0", THROATS), strict=True):
         for pair, colour, marker in ((ARCHIE, "#D55E00", "s"), (FINEST, "#0072B2", "o")):
-            error = 100.0 * (cut[pair] - 1.0)
-            axes.plot(cut[against], error, marker, ms=4, color=colour, alpha=0.7, label=pair)
+            error, law = 100.0 * (cut[pair] - 1.0), pair.split(" + ")[1]
+            axes.plot(cut[against], error, marker, ms=4, color=colour, alpha=0.7, label=law)
         axes.axhline(0.0, color="#1A1A1A", lw=0.8)
-        axes.set_xscale("log")
+        axes.set(xscale="log", ylabel="error of k/k0, %")
         axes.grid(lw=0.3)
     panels[1].axvline(FEW_THROATS, color="#1A1A1A", lw=0.8, ls=":")
-    panels[0].set(xlabel="k/k0 by resolved flow", ylabel="error of k/k0, %")
+    panels[0].set(xlabel="k/k0 by resolved flow")
     panels[1].set(xlabel="throats that carry the flow")
     panels[0].legend()
     with replacing(folder / FIGURE) as part:
