@@ -60,15 +60,15 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     shutil.rmtree(folder, ignore_errors=True)
     before = _child_seconds()
     if system == "collision":
-        found = collision(folder, stiffness=value, factor=0.1, phase=0.5)
+        numbers = collision(folder, stiffness=value, factor=0.1, phase=0.5)
     elif system == "four collisions":
-        found = _worst_collision(folder, value)
+        numbers = _worst_collision(folder, value)
     elif system == "undamped pack":
-        found = thrown_pack(folder, factor=value, seed=int(point.seed), spans=SPANS)
+        numbers = thrown_pack(folder, factor=value, seed=int(point.seed), spans=SPANS)
     else:
         scheme = str(point.settings.get("scheme", "every step"))
-        found = _fall(folder, scheme, value, int(point.settings.get("looks", 0)))
-    return found | {"core_s": _child_seconds() - before}
+        numbers = _fall(folder, scheme, value, int(point.settings.get("looks", 0)))
+    return numbers | {"core_s": _child_seconds() - before}
 
 
 def _child_seconds() -> float:
@@ -304,8 +304,8 @@ def _fallen(
     """Largest error of the velocity of one free fine, over its terminal velocity v_T, and steps.
 
     The exact velocity is v_T (1 - exp(-t / tau)) with the relaxation time tau (Stokes 1851). The
-    step is `over_tau` tau (a twentieth of it where drag is held so long), the duration `spans` tau,
-    and the fine is looked at after every `chunk` tau.
+    step is `over_tau` tau, or a twentieth of it where drag is held so long. The duration is
+    `spans` tau, and the fine is looked at after every `chunk` tau.
     """
     radius, density, viscosity = 0.05e-3, 2146.0, 0.05
     tau = relaxation_time(radius, density, viscosity)
