@@ -121,10 +121,14 @@ def _scale(axes: "Axes", points: Sequence[Level], panel: Mapping[str, Any]) -> N
 
 
 def _short(value: str) -> str:
+    """A value of a knob in few letters: 1e4, but 1,525."""
     try:
-        return f"{float(value):.3g}".replace("e+0", "e").replace("e-0", "e-")
+        number = float(value)
     except ValueError:
         return value
+    if number != float(f"{number:.3g}") and number.is_integer():
+        return f"{number:,.0f}"
+    return f"{number:.3g}".replace("e+0", "e").replace("e-0", "e-")
 
 
 def draw_answer(shortcuts: Sequence[Shortcut], path: Path) -> None:
