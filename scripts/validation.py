@@ -20,6 +20,7 @@ CHAPTERS: dict[str, str] = {
     "outside": "validation.outside",
     "mechanics": "validation.mechanics",
     "bridging": "validation.bridging",
+    "thesis": "validation.thesis.command",
 }
 """Name and module of the comparisons with a command of their own, `main(arguments) -> int`.
 

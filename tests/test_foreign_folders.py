@@ -130,17 +130,6 @@ def test_decks_are_not_written_into_a_run_folder(tmp_path, case, capsys):
     assert "run folder" in err
 
 
-def test_the_growth_of_the_thesis_is_not_written_over_a_folder_of_somebody_else(tmp_path):
-    from fdnet.errors import CaseError
-    from validation.thesis.command import keep_growth
-
-    (tmp_path / "growth").mkdir()
-    (tmp_path / "growth" / "plants.csv").write_text("mine")
-    with pytest.raises(CaseError, match="holds files that fdnet did not write"):
-        keep_growth(tmp_path / "states" / "growth.npz", tmp_path / "growth", None)  # type: ignore
-    assert (tmp_path / "growth" / "plants.csv").read_text() == "mine"
-
-
 @pytest.mark.parametrize("how", ["itself", "link", "hard link", "dots"])
 def test_the_table_of_laws_never_replaces_its_input(tmp_path, capsys, how):
     spheres, table = tmp_path / "s.csv", tmp_path / "t.csv"

@@ -2,6 +2,9 @@
 
 import json
 import math
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -234,6 +237,31 @@ def test_an_isolated_point_has_its_own_memory_and_a_time_limit(tmp_path, monkeyp
     assert [row["status"] for row in study.measured(one, tmp_path / "late", print)] == [
         "over time: more than 0.05 s"
     ]
+
+
+def test_a_killed_study_leaves_no_process(tmp_path):
+    """Also while a point computes in a process of its own."""
+    code = (
+        "import pathlib\nfrom validation import study\n"
+        "one = study.read_study('linear-solver')\n"
+        "points = [one.data['points'][-1] | {'isolated': True}]\n"
+        "list(study.measured(one._replace(data=one.data | {'points': points}),"
+        " pathlib.Path('.'), print))\n"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path)
+    children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children")
+    deadline = time.monotonic() + 60
+    while not (child := children.read_text().split()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert child
+    time.sleep(2.0)
+    parent.kill()
+    parent.wait()
+    while Path(f"/proc/{child[0]}/cmdline").exists() and time.monotonic() < deadline:
+        if not Path(f"/proc/{child[0]}/cmdline").read_bytes():  # it has ended
+            break
+        time.sleep(0.05)
+    assert time.monotonic() < deadline
 
 
 def test_the_picture_of_every_kept_table_is_there_and_narrow_enough_for_a_phone(tmp_path):

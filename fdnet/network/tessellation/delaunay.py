@@ -170,15 +170,28 @@ def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, 
         # the sphere centred `depth` inside whose part in the box has the volume of the cap:
         # half sphere 2 pi r^3 / 3 against cap pi h^2 (3 R - h) / 3
         cap = 0.5 * height**2 * (3.0 * radius - height)
-        same = np.cbrt(cap)
-        for _ in range(ITERATIONS):
-            same = np.cbrt(np.maximum(cap - 1.5 * depth * same**2 + 0.5 * depth**3, 0.0))
+        same = _radius_of_cap(cap, depth)
         radius = np.where(outside, np.maximum(same, depth), radius)
         near = beyond > -max(tolerance, depth)
         middle = 0.5 * (low + high)
         position[near, axis] = np.where(position[near, axis] < middle, low + depth, high - depth)
         moved |= outside
     return replace(grains, position=position, radius=radius), int(moved.sum())
+
+
+def _radius_of_cap(cap: Array, depth: float) -> Array:
+    """The root r (N,) m of r^3 + 3/2 depth r^2 - depth^3 / 2 = cap (N,) m3, by Newton's steps.
+
+    They add, multiply and divide alone, which every processor rounds alike. Cube roots differ in
+    the last digit, which decides on flat throats at the face.
+    """
+    target = cap + 0.5 * depth**3
+    root = np.ldexp(1.0, -(-np.frexp(target)[1] // 3))
+    for _ in range(ITERATIONS):
+        square = root * root
+        slope = 3.0 * (square + depth * root)
+        root = root - (root * square + 1.5 * depth * square - target) / slope
+    return np.asarray(root)
 
 
 # ------------------------------------------------------------------------------------------------

@@ -26,7 +26,8 @@ def insertion_order(points: Array) -> Array:
     cell = np.minimum((points - low) / size * 2**BITS, 2**BITS - 1).astype(np.int64)
     rank = np.random.default_rng(ORDER_SEED).permutation(count)
     late = np.floor(np.log((rank + 1.0) / count) / np.log(SHARE)).astype(np.int64)
-    return np.argsort(((late + 2 * BITS) << (3 * BITS)) + _along_curve(cell))
+    # stable, for the order that other sorts give to equal places depends on the processor
+    return np.argsort(((late + 2 * BITS) << (3 * BITS)) + _along_curve(cell), kind="stable")
 
 
 @compiled

@@ -1,110 +1,114 @@
-"""Run or continue the planned runs of the thesis, then write tables and figures."""
+"""The specimens of X. Shi's thesis (UT Austin, 2011) at full scale, next to its numbers.
 
-import shutil
-import sys
+.venv/bin/python scripts/validation.py thesis [--quick] [--jobs N]    runs, tables, figures
+.venv/bin/python scripts/validation.py thesis --redraw                no runs
+"""
+
+import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from fdnet.dem.liggghts import Launch, find_binary
+import pandas as pd
+
+from fdnet.case.file import QUICK
 from fdnet.errors import CaseError, LiggghtsError
-from fdnet.run.folder import is_run_folder, is_unused, mark_folder
-from validation.thesis.collection import collect
-from validation.thesis.compare.trend_table import trends_table
-from validation.thesis.outputs import write_outputs
-from validation.thesis.runs.carry_out import Report, carry_out
-from validation.thesis.runs.growth import GROWTH, grow, write_growth
-from validation.thesis.runs.plan import Planned, planned
-
-STATES = "states"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ThesisOptions:
-    """Options of the study.
-
-    Attributes:
-        out: folder of the tables and figures; its folder STATES holds the states.
-        runs: folder of the run folders while they are needed.
-        quick: run the quick forms only.
-        jobs: number of runs at the same time.
-        redraw: run nothing, and make tables and figures from the kept states.
-        show: report the progress on stderr.
-    """
-
-    out: Path
-    runs: Path
-    quick: bool = False
-    jobs: int = 1
-    redraw: bool = False
-    show: bool = True
+from fdnet.files import path_option, refuse_folder_name, write_text
+from validation.thesis.compare import tables, trends
+from validation.thesis.figures import Sources, draw_all
+from validation.thesis.quantities import (
+    Run,
+    deposition,
+    examine,
+    result_rows,
+    statistics,
+)
+from validation.thesis.runs import Planned, find_state, make_runs, planned
 
 
-def run_thesis(options: ThesisOptions) -> str:
-    """Run or continue the study and write its tables and figures; returns the trends as text.
+def main(arguments: list[str]) -> int:
+    """Make or continue the runs, write tables and figures; returns the exit code.
 
-    Raises LiggghtsError when runs failed, after the results of all others are written, and
+    Raises LiggghtsError when runs failed, after the tables of all others are written, and
     CaseError when there is nothing to draw.
     """
-    plan, states = planned(quick=options.quick), options.out / STATES
-    report = _reporter(options.show)
-    failed = {} if options.redraw else _run(plan, options, states, report)
-    results = collect(plan, options.out, states, report=report)
-    if not results.rows:
-        raise CaseError(
-            f"{options.out}: the folder holds no state and no results of this study; leave out "
-            "--redraw to run it"
-        )
-    comparisons = write_outputs(results, plan, options.out, states)
+    parser = argparse.ArgumentParser(
+        prog="validation.py thesis",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--quick", action="store_true", help="one run of each quick form, minutes")
+    parser.add_argument("--redraw", action="store_true", help="run nothing, draw the kept states")
+    parser.add_argument("--jobs", type=int, default=1, help="runs side by side (default 1)")
+    parser.add_argument("--out", type=path_option, help="tables and figures (docs/thesis)")
+    parser.add_argument(
+        "--runs", type=path_option, default=Path("runs/thesis"), help="run folders"
+    )
+    parser.add_argument("--silent", action="store_true", help="no progress")
+    options = parser.parse_args(arguments)
+    out = options.out or Path("studies/thesis-quick" if options.quick else "docs/thesis")
+    for folder in (options.runs, out):
+        refuse_folder_name(folder)
+    if options.jobs < 1:
+        raise CaseError(f"--jobs: {options.jobs} runs side by side, expected at least 1")
+    plan, states, failed = planned(quick=options.quick), out / "states", []
+    if not options.redraw:
+        show = not options.silent
+        failed = make_runs(plan, states, options.runs, jobs=options.jobs, show=show)
+    compared = write_all(plan, out, states)
+    print(compared.groupby(["trend", "scale", "laws", "verdict"]).size().to_string())
+    print(f"tables and figures: {out}")
     if failed:
-        lines = "; ".join(f"{item.id} seed {item.seed}: {why}" for item, why in failed.items())
-        raise LiggghtsError(
-            f"{len(failed)} of {len(plan)} runs failed, run the study again to continue: {lines}"
-        )
-    text = trends_table(comparisons)
-    if results.missing:
-        text += (
-            f"\n\n{len(results.missing)} of {len(plan)} runs are missing; leave out --redraw to "
-            "run them"
-        )
-    return text
+        raise LiggghtsError(f"run the study again to continue; failed: {'; '.join(failed)}")
+    return 0
 
 
-def _run(
-    plan: Sequence[Planned], options: ThesisOptions, states: Path, report: Report
-) -> dict[Planned, str]:
-    binary = find_binary()
-    if not options.quick and not (states / GROWTH).exists():
-        keep_growth(states / GROWTH, options.runs / "growth", Launch(binary=binary))
-    return carry_out(plan, states, options.runs, jobs=options.jobs, report=report)
+def write_all(plan: Sequence[Planned], out: Path, states: Path) -> pd.DataFrame:
+    """Write the tables and figures of all runs that have a state; returns trends.csv.
 
-
-def keep_growth(path: Path, folder: Path, launch: Launch) -> None:
-    """Pack the thesis's 1,410 grains (Figure 9) once more, and keep stages of the growth.
-
-    Args:
-        path: file of the stages.
-        folder: run folder, removed at the end.
-        launch: how LIGGGHTS is started.
+    Rows of an earlier results.csv stay where a run has no state, or none by those laws today. Runs
+    of specimens and variants are drawn, or the quick forms when there is nothing else.
     """
-    case = Planned(case="specimen1-1410", group="variant").load()
-    assert case.grains.count is not None
-    if folder.exists() and not (folder.is_dir() and (is_run_folder(folder) or is_unused(folder))):
+    kept: Any = pd.read_csv(out / "results.csv") if (out / "results.csv").exists() else None
+    results: list[dict[str, Any]] = []
+    runs: list[Run] = []
+    for item in plan:
+        state, rows = find_state(states, item), []
+        if state is not None:
+            runs.append(examine(item, state))
+            rows = result_rows(runs[-1])
+            if item.group not in ("specimen", "variant") and len(plan) > len(planned(quick=True)):
+                runs.pop()
+        known = {(one["law"], one["damage_law"]) for one in rows}
+        if kept is not None:
+            mine: Any = kept[(kept.id == item.id) & (kept.seed == item.seed)].to_dict("records")
+            rows += [one for one in mine if (one["law"], one["damage_law"]) not in known]
+        results += rows
+    if not results:
         raise CaseError(
-            f"{folder}: holds files that fdnet did not write; give another --runs (nothing was "
-            "changed)"
+            f"{out}: the folder holds no state and no results of this study; leave out --redraw "
+            "to run it"
         )
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    mark_folder(folder)
+    table = _write(out / "results.csv", results)
+    measured = [row for run in runs for row in statistics(run)]
+    path = out / "statistics.csv"
+    if path.exists():  # what earlier scripts measured in another way stays
+        readings = {row["note"].split(";")[0] for row in measured}
+        earlier: Any = pd.read_csv(path, keep_default_na=False).to_dict("records")
+        measured += [row for row in earlier if row["note"].split(";")[0] not in readings]
+    _write(path, measured)
+    _write(out / "deposition.csv", [row for run in runs for row in deposition(run)])
+    compared = _write(out / "trends.csv", trends(table))
+    _write(out / "tables.csv", list(tables(table)))
+    by_name: dict[str, list[Run]] = {}
+    for run in runs:
+        by_name.setdefault(run.item.name.removeprefix(QUICK), []).append(run)
+    _write(out / "figures.csv", draw_all(Sources(by_name, table), out))
+    return compared
+
+
+def _write(path: Path, rows: Any) -> pd.DataFrame:
+    table = pd.DataFrame(rows)
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_growth(path, grow(case, folder, launch, count=case.grains.count))
-    shutil.rmtree(folder)
-
-
-def _reporter(show: bool) -> Report:
-    def report(line: str) -> None:
-        if show:
-            print(f"thesis: {line}", file=sys.stderr, flush=True)
-
-    return report
+    write_text(path, table.to_csv(index=False, float_format="%.9g"))
+    return table

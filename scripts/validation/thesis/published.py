@@ -1,0 +1,73 @@
+"""The numbers of the thesis (Shi 2011), read from published.toml.
+
+Lengths are in mm, volumes in mm3; everything else is a fraction or a count.
+"""
+
+import csv
+import tomllib
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+TABLE3 = "table3"
+SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
+Between = tuple[float, float] | None
+"""(low, high) of a range [low, high); None for a quantity itself."""
+
+
+def rows_in(name: str) -> list[Any]:
+    """The rows of a table next to this module, with a column of texts as an attribute each."""
+    with Path(__file__).with_name(name).open(newline="", encoding="utf-8") as file:
+        return [SimpleNamespace(**row) for row in csv.DictReader(file)]
+
+
+@cache
+def published() -> Mapping[str, Any]:
+    """All numbers: `first_section_mm`, `specimens` by name, `statistic` and `deposition`."""
+    tables = tomllib.loads(Path(__file__).with_name("published.toml").read_text(encoding="utf-8"))
+    specimens = {f"specimen{one['id']}": one for one in tables["specimen"]}
+    specimens[TABLE3] = tables[TABLE3]
+    for one in specimens.values():
+        one["porosity_loss"] = one["porosity"] - one["damaged_porosity"][0]
+    return tables | {"specimens": specimens}
+
+
+def specimen_of(run: str) -> str:
+    """The specimen that a run is compared with, "" where there is none.
+
+    "specimen5" for "specimen5", "specimen5-5to6", "quick-specimen5" and "specimen5 set=1".
+    """
+    name = run.removeprefix("quick-").split(" ")[0].split("-")[0]
+    return name if name in published()["specimens"] else ""
+
+
+def thesis_of(run: str) -> Mapping[str, Any]:
+    """The thesis's numbers of the run's specimen; empty where there are none."""
+    return published()["specimens"].get(specimen_of(run), {})
+
+
+def reductions(one: Mapping[str, Any]) -> Sequence[float]:
+    """1 - k/k0 by section of 1 mm: all eight of a table, or the first of a figure, or none."""
+    first = [one["first_section_reduction"]] if "first_section_reduction" in one else []
+    return one.get("section_reduction", first)
+
+
+def statistics_of(run: str) -> Mapping[tuple[str, Between], Mapping[str, Any]]:
+    """Numbers on pores and throats of the run's specimen, by quantity and range."""
+    number = specimen_of(run).removeprefix("specimen")
+    every = published()["statistic"]
+    return {key_of(one): one for one in every if one["specimen"] == number}
+
+
+def key_of(statistic: Mapping[str, Any]) -> tuple[str, Between]:
+    """Quantity and range of a statistic."""
+    between = statistic.get("between")
+    return statistic["quantity"], None if between is None else (between[0], between[1])
+
+
+def in_words(sense: str, value: float, scale: float = 1.0) -> str:
+    """A number of the thesis, such as "about 70"; "" before an exact one."""
+    told = f"{round(scale * value, 6):.6g}"
+    return told if sense in ("", "exact") else f"{sense} {told}"

@@ -1,0 +1,421 @@
+"""What is measured on each run, and on its first millimetre.
+
+RUN holds numbers of a whole run, FIELDS sizes of each pore or throat of the first millimetre,
+SINGLES numbers of that section, which the thesis examines in section 3.3 (Shi 2011).
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fdnet.errors import CaseError
+from fdnet.names import ALL_SPHERES, DEFAULT_LAW
+from fdnet.network.flow.sections import reduction
+from fdnet.network.laws.damage import CLOGGING, DEPOSITION
+from fdnet.network.network import Network
+from fdnet.network.permeability import Analysis, compare
+from fdnet.spheres.snapshot import Array
+from validation.thesis.published import (
+    Between,
+    key_of,
+    published,
+    reductions,
+    statistics_of,
+    thesis_of,
+)
+from validation.thesis.runs import Planned, State
+
+MM, SECTIONS = 1e-3, 8
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Run:
+    """The state of one run, and its analyses by the thesis's laws and by fdnet's own."""
+
+    item: Planned
+    state: State
+    thesis: Analysis
+    own: Analysis
+
+    @property
+    def depth(self) -> Array:
+        """(F,) m, depth of each fine centred in the specimen."""
+        low, high = self.state.damaged.box[0]
+        x = self.state.damaged.fines().position[:, 0]
+        return x[(x >= low) & (x < high)] - low
+
+
+def examine(item: Planned, state: State) -> Run:
+    """Analyse a state with the sections and bins of its case.
+
+    Raises NetworkError on degenerate geometry, FlowError on a solve that fails its checks.
+    """
+    thesis, own = compare(
+        state.grains,
+        state.damaged,
+        periodic=state.case.periodic,
+        options=state.case.analysis,
+        laws=[("thesis", "thesis"), (DEFAULT_LAW, ALL_SPHERES)],
+    )
+    return Run(item=item, state=state, thesis=thesis, own=own)
+
+
+def share(part: Array, weights: Any = 1.0) -> float:
+    """Share (by weight) of the values (N,) that are true; nan where there are none."""
+    weights = np.broadcast_to(weights, part.shape)
+    total = float(np.sum(weights))
+    return float(np.sum(weights[part])) / total if total > 0 else math.nan
+
+
+# ------------------------------------------------------------------------------------------------
+# Numbers of a whole run: results.csv.
+
+
+def deep_near_wall(run: Run) -> float:
+    """Share of the fines beyond 1 mm centred within a mean grain radius of a side wall."""
+    (low, high), *sides = run.state.damaged.box
+    place = run.state.damaged.fines().position
+    place = place[(place[:, 0] >= low + MM) & (place[:, 0] < high)]
+    to_wall = [np.minimum(place[:, i] - a, b - place[:, i]) for i, (a, b) in enumerate(sides, 1)]
+    near = np.minimum(*to_wall) < run.state.case.grains.mean_radius_m
+    return math.nan if any(run.state.case.periodic) else share(near)
+
+
+def _told(name: str) -> Callable[[Run, Analysis], float]:
+    """A number of the thesis; its counts only for specimens of its size."""
+
+    def told(run: Run, _: Analysis) -> float:
+        value = thesis_of(run.item.id).get(name, math.nan)
+        quick = "count" in name and run.item.group == "quick"
+        return math.nan if quick else float(value[0] if isinstance(value, list) else value)
+
+    return told
+
+
+RUN: Mapping[str, Callable[[Run, Analysis], Any]] = {
+    "id": lambda run, a: run.item.id,
+    "seed": lambda run, a: run.item.seed,
+    "digest": lambda run, a: run.state.case.digest(),
+    "law": lambda run, a: a.law,
+    "damage_law": lambda run, a: a.damage_law,
+    "porosity_initial": lambda run, a: a.porosity_initial,
+    "porosity_damaged": lambda run, a: a.porosity_damaged,
+    "porosity_loss_first_mm": lambda run, a: (
+        a.sections[0].porosity_initial - a.sections[0].porosity_damaged
+    ),
+    "invaded_count": lambda run, a: a.invaded_count,
+    "count_first_mm": lambda run, a: int(np.sum(run.depth < MM)),
+    "invasion_depth_mm": lambda run, a: 1e3 * a.invasion_depth,
+    "invasion_depth_p95_mm": lambda run, a: 1e3 * a.invasion_depth_p95,
+    "mean_depth_mm": lambda run, a: 1e3 * float(run.depth.mean()) if len(run.depth) else math.nan,
+    "fraction_first_0p25mm": lambda run, a: share(run.depth < 0.25 * MM),
+    "fraction_first_mm": lambda run, a: share(run.depth < MM),
+    "fraction_beyond_0p5mm": lambda run, a: share(run.depth >= 0.5 * MM),
+    "fraction_deep_near_wall": lambda run, a: deep_near_wall(run),
+    "k_reduction": lambda run, a: a.k_reduction,
+    "*k_reduction": lambda run, a: [one.k_reduction for one in a.sections],
+    "*k_reduction_inplace": lambda run, a: [
+        reduction(one.k_initial_inplace, one.k_damaged_inplace) for one in a.sections
+    ],
+    "k_initial_m2": lambda run, a: a.k_initial,
+    "k_damaged_m2": lambda run, a: a.k_damaged,
+    "throats": lambda run, a: len(a.network.throat_radius),
+    "throats_blocked": lambda run, a: 0 if a.occupancy is None else int(a.occupancy.blocked.sum()),
+    "supplied_count": lambda run, a: run.state.ending["supplied"],
+    "passed_count": lambda run, a: run.state.ending["passed"],
+    "cake_thickness_mm": lambda run, a: 1e3 * a.cake_thickness,
+    "stop_reason": lambda run, a: run.state.ending["stop_reason"],
+    "time_ms": lambda run, a: 1e3 * run.state.ending["steps"] * run.state.ending["dt_s"],
+    "seconds": lambda run, a: float(run.state.ending["seconds"]),
+    "pack_seconds": lambda run, a: float(run.state.ending["pack_seconds"]),
+    "max_overlap": lambda run, a: float(run.state.ending["max_overlap"]),
+    "thesis_damaged_porosity": _told("damaged_porosity"),
+    "thesis_depth_mm": _told("invaded_depth_mm"),
+    "thesis_invaded_count": _told("invaded_count"),
+    "*thesis_k_reduction": lambda run, a: reductions(thesis_of(run.item.id)),
+    "thesis_fraction_first_bin": _told("fraction_first_bin"),
+    "thesis_fraction_beyond_0p5mm": _told("fraction_beyond_0p5mm"),
+    "thesis_face_porosity_loss": _told("face_porosity_loss"),
+    "thesis_count_first_mm": _told("count_first_mm"),
+}
+"""Columns of results.csv; a star marks one of each section, NAME_1 to NAME_8.
+
+Porosity counts overlap once; shares of fines are by number; reductions are 1 - k/k0, of sections
+cut out of the specimen, and in place by the pressures of the whole.
+"""
+
+
+def result_rows(run: Run) -> list[dict[str, Any]]:
+    """One row for each pair of laws. Raises CaseError on more than 8 sections."""
+    if len(run.thesis.sections) > SECTIONS:
+        raise CaseError(f"{run.item.id}: analysis.sections: results.csv has room for {SECTIONS}")
+    rows: list[dict[str, Any]] = []
+    for analysis in (run.thesis, run.own):
+        rows.append({})
+        for name, value in RUN.items():
+            one = value(run, analysis)
+            if name[0] == "*":
+                filled = [*one, *[None] * SECTIONS][:SECTIONS]
+                known = [math.nan if value is None else value for value in filled]
+                rows[-1] |= {f"{name[1:]}_{i}": value for i, value in enumerate(known, 1)}
+            else:
+                rows[-1][name] = one
+    return rows
+
+
+# ------------------------------------------------------------------------------------------------
+# The first millimetre: statistics.csv.
+
+WHOLE = "pores of four grains, throats between two such"
+CUT = "with those cut by a face, by the part inside"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Section:
+    """Pores (P) and throats (T), weighted for the first millimetre.
+
+    Attributes:
+        reading: WHOLE or CUT.
+        weight: of "pore" and "throat": 1 for one that counts whole, 0 for one elsewhere.
+        run: the run.
+    """
+
+    reading: str
+    weight: Mapping[str, Array]
+    run: Run
+
+    @property
+    def network(self) -> Network:
+        """Pores and throats of the whole specimen."""
+        return self.run.thesis.network
+
+    @property
+    def fines(self) -> Any:
+        """What the fines fill. Raises CaseError without fines."""
+        if self.run.thesis.occupancy is None:
+            raise CaseError(f"{self.run.item.id}: holds no fines; examine an invaded specimen")
+        return self.run.thesis.occupancy
+
+    @property
+    def throat_depth(self) -> Array:
+        """(T,) m, depth of the middle of each throat of the specimen."""
+        middle = self.network.throat_ends[:, :, 0].mean(axis=1)
+        return np.asarray(middle - self.network.box[0, 0])
+
+
+def first_section(run: Run, reading: str) -> Section:
+    """The pores and throats centred within 1 mm of the face; a throat midway between its pores.
+
+    Facets within one polyhedron, which may be split in several ways, are no throats. WHOLE counts
+    pores of four grains of the specimen and throats between two such; CUT also those cut by its
+    faces, each by the part inside, which together fill the section.
+    """
+    network, end = run.thesis.network, run.thesis.network.box[0, 0] + MM
+    group = network.pore_group[network.throat_pores]
+    pore = network.pore_position[:, 0] < end
+    throat = (network.throat_ends[:, :, 0].mean(axis=1) < end) & (group[:, 0] != group[:, 1])
+    pores, throats = network.pore_share, network.throat_share
+    if reading == WHOLE:
+        pores = (network.pore_share == 1.0).astype(float)
+        throats = pores[network.throat_pores].all(axis=1).astype(float)
+    pores, throats = np.where(pore, pores, 0.0), np.where(throat, throats, 0.0)
+    return Section(reading=reading, weight={"pore": pores, "throat": throats}, run=run)
+
+
+POROSITY = "porosity of throats with fines"
+FIELDS: Mapping[str, tuple[str, str, Callable[[Section], Array]]] = {
+    "pore radius": ("mm", "pore", lambda s: 1e3 * s.network.pore_radius),
+    "throat radius": ("mm", "throat", lambda s: 1e3 * s.network.throat_radius),
+    "throat length": ("mm", "throat", lambda s: 1e3 * s.network.throat_length),
+    "pore volume": ("mm3", "pore", lambda s: 1e9 * s.network.pore_volume),
+    "volume of the inscribed sphere of a pore": (
+        "mm3",
+        "pore",
+        lambda s: 4e9 / 3.0 * np.pi * s.network.pore_radius**3,
+    ),
+    "pore volume with fines": (
+        "mm3",
+        "pore",
+        lambda s: 1e9 * (s.network.pore_volume - s.fines.pore_solid_volume),
+    ),
+    "throat depth": ("mm", "throat", lambda s: 1e3 * s.throat_depth),
+    POROSITY: ("", "throat", lambda s: s.fines.throat_porosity),
+    "conductance": ("mm3", "throat", lambda s: 1e9 * s.run.thesis.conductance_initial),
+    "conductance with fines": ("mm3", "throat", lambda s: 1e9 * s.run.thesis.conductance_damaged),
+}
+"""Quantities of each pore or throat: unit, whose weight counts, values."""
+
+
+def weighted(section: Section, name: str) -> tuple[Array, Array]:
+    """Values of one of FIELDS and their weights; POROSITY counts throats with fines alone."""
+    _, of, values = FIELDS[name]
+    counted = section.fines.throat_fines > 0 if name == POROSITY else 1.0
+    return values(section), section.weight[of] * counted
+
+
+def within(values: Array, between: tuple[float, float]) -> Array:
+    """Whether each value (N,) lies in [low, high).
+
+    A low end of 0 also takes in what overlap puts below it; a high end of 1, a porosity's, also
+    takes in what is at it.
+    """
+    low, high = between[0] or -math.inf, between[1] if between[1] != 1.0 else math.inf
+    return np.asarray((values >= low) & (values < high))
+
+
+def _of_throats(part: Callable[[Any], Array]) -> Callable[[Section], float]:
+    return lambda s: share(part(s.fines), s.weight["throat"])
+
+
+def _filled(section: Section, what: str) -> float:
+    """Volume of fines, mm3. A fine counts in every throat that it reaches, for throats overlap."""
+    solid = getattr(section.fines, f"{what}_solid_volume")
+    return 1e9 * float(np.sum(section.weight[what] * solid))
+
+
+def _free(section: Section, what: str) -> float:
+    """Share of throats' cylinders, or of pore bodies, that no fine fills."""
+    network = section.network
+    whole = network.pore_volume
+    if what == "throat":
+        whole = np.pi * network.throat_radius**2 * network.throat_length
+    total = 1e9 * float(np.sum(section.weight[what] * whole))
+    return 1.0 - _filled(section, what) / total if total > 0 else math.nan
+
+
+def _mean_porosity(section: Section) -> float:
+    values, weights = weighted(section, POROSITY)
+    return float(np.average(values, weights=weights)) if weights.any() else math.nan
+
+
+def _in_throats(section: Section) -> float:
+    both = _filled(section, "throat") + _filled(section, "pore")
+    return _filled(section, "throat") / both if both > 0 else math.nan
+
+
+SINGLES: Mapping[str, tuple[str, Callable[[Section], float]]] = {
+    "throats without fines": ("share", _of_throats(lambda fines: fines.throat_fines == 0)),
+    "throats with fines": ("share", _of_throats(lambda fines: fines.throat_fines > 0)),
+    "throats blocked": ("share", _of_throats(lambda fines: fines.blocked)),
+    "throats of radius 0": (
+        "count",
+        lambda s: float(np.sum((s.weight["throat"] > 0) & (s.network.throat_radius == 0))),
+    ),
+    "mean porosity of throats with fines": ("", _mean_porosity),
+    "overall throat porosity": ("", lambda s: _free(s, "throat")),
+    "overall pore-body porosity": ("", lambda s: _free(s, "pore")),
+    "volume of fines in throats": ("mm3", lambda s: _filled(s, "throat")),
+    "volume of fines in pore bodies": ("mm3", lambda s: _filled(s, "pore")),
+    "share of throats in the volume of fines": ("share", _in_throats),
+}
+"""Numbers of a section, with their units."""
+
+
+def measure(section: Section, quantity: str, between: Between) -> tuple[float, str]:
+    """One of SINGLES with its unit, or the share of one of FIELDS in a range."""
+    if between is None:
+        unit, value = SINGLES[quantity]
+        return value(section), unit
+    values, weights = weighted(section, quantity)
+    return share(within(values, between), weights), "share"
+
+
+def statistics(run: Run) -> Iterator[dict[str, Any]]:
+    """Rows of statistics.csv: every quantity that the thesis has for any specimen.
+
+    Each is measured by the readings WHOLE and CUT. Rows of the section's grains tessellated alone,
+    the thesis's own reading, were made by an earlier script.
+    """
+    wanted = dict.fromkeys(key_of(one) for one in published()["statistic"])
+    for reading in (WHOLE, CUT):
+        section = first_section(run, reading)
+        for quantity, between in wanted:
+            words, (ours, unit) = quantity, measure(section, quantity, between)
+            if between is not None:
+                words += f" {between[0]:g} to {between[1]:g} {FIELDS[quantity][0]}"
+            one = statistics_of(run.item.id).get((quantity, between), {})
+            yield {
+                "id": run.item.id,
+                "seed": run.item.seed,
+                "source": one.get("source", ""),
+                "quantity": words.strip(),
+                "ours": ours,
+                "thesis": one.get("value", math.nan),
+                "sense": one.get("sense", ""),
+                "unit": unit,
+                "note": f"{reading}; {one['note']}" if one.get("note") else reading,
+            }
+
+
+# ------------------------------------------------------------------------------------------------
+# Where fines sit in throats (Shi 2011, Figures 56 and 57): deposition.csv.
+
+
+def fines_in_class(section: Section, between: tuple[float, float]) -> Mapping[str, Array]:
+    """The K pairs of a fine and a throat of porosity in [low, high) that it reaches.
+
+    `distance` of the fine's centre from the axis over the throat's radius, `volume` m3 of it
+    within the throat, `weight` and index of the `throat`.
+    """
+    fines, weight = section.fines, section.weight["throat"]
+    chosen = within(fines.throat_porosity, between) & (weight > 0)
+    use = chosen[fines.pair_throat]
+    throat = fines.pair_throat[use]
+    found = {"distance": fines.pair_distance[use], "volume": fines.pair_volume[use]}
+    return found | {"weight": weight[throat], "throat": throat}
+
+
+def deposition(run: Run) -> Iterator[dict[str, Any]]:
+    """Rows of deposition.csv: shares of the fines by place, for classes of throat porosity.
+
+    `law` is by the thesis's rule: deposition where most fines are nearer the wall or beyond it.
+    `decided` tells whether the 95 % interval of that share leaves out 1/2; it takes the fines as
+    independent, which fines of one throat are not quite.
+    """
+    section = first_section(run, WHOLE)
+    for claim in published()["deposition"]:
+        told = claim if run.item.name.startswith("specimen5") else {}
+        fines = fines_in_class(section, claim["throat_porosity"])
+        near, far = fines["distance"] < 0.5, fines["distance"] > 1.0
+        parts = {"nearer_axis": near, "nearer_wall": ~near & ~far, "beyond_wall": far}
+        weight, total = fines["weight"], float(np.sum(fines["weight"]))
+        shares = {name: share(part, weight) for name, part in parts.items()}
+        for name, part in parts.items():
+            shares[f"{name}_volume"] = share(part, weight * fines["volume"])
+        wall = 1.0 - shares["nearer_axis"]
+        low, high = wilson_interval(wall * total, total)
+        yield {
+            "id": run.item.id,
+            "seed": run.item.seed,
+            "low": claim["throat_porosity"][0],
+            "high": claim["throat_porosity"][1],
+            "whole": True,
+            "throats": float(np.sum(section.weight["throat"][np.unique(fines["throat"])])),
+            "fines": total,
+            **shares,
+            "wall_low": low,
+            "wall_high": high,
+            "law": "" if not total else DEPOSITION if wall > 0.5 else CLOGGING,
+            "decided": low > 0.5 or high < 0.5,
+            "nearer": told.get("nearer", ""),
+            "thesis": told.get("value", math.nan),
+            "sense": told.get("sense", ""),
+            "source": claim["source"],
+        }
+
+
+def wilson_interval(part: float, total: float) -> tuple[float, float]:
+    """The 95 % interval of a share of weighted sums; nan without any.
+
+    Source: Wilson 1927, J. Am. Stat. Assoc. 22, 209.
+    """
+    if total <= 0:
+        return math.nan, math.nan
+    z = 1.959963984540054
+    square, portion = z**2 / total, part / total
+    spread = z * math.sqrt(part * (total - part) / total + 0.25 * z**2) / total
+    low, high = ((portion + 0.5 * square + one) / (1.0 + square) for one in (-spread, spread))
+    return max(0.0, min(portion, low)), min(1.0, max(portion, high))

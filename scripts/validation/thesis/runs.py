@@ -1,0 +1,241 @@
+"""The runs of the thesis's specimens: their plan, how they are made, and the states kept."""
+
+import json
+import tomllib
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+import fdnet
+from fdnet.case.case import InvasionCase, with_fines
+from fdnet.case.file import case_from, case_path, read_case
+from fdnet.dem.liggghts import find_binary
+from fdnet.errors import CaseError
+from fdnet.files import write_bytes, write_text
+from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from validation.thesis.published import TABLE3, rows_in
+
+VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", TABLE3)
+
+# ------------------------------------------------------------------------------------------------
+# The plan.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Planned:
+    """One run: a shipped case with a seed and perhaps a changed setting, from plan.csv.
+
+    Attributes:
+        group: "specimen", "variant", "quick", "reason" (what might let more fines in), or what is
+            scanned: "friction", "drag" or "supply".
+        name: name of the case, with "quick-" before it for its quick form.
+        seed: seed of the run.
+        setting: the change as "key=value"; "" for none.
+        value: value of what is scanned, "" without one.
+        consequence: a setting that follows, and does not stand in the run's name.
+    """
+
+    group: str
+    name: str
+    seed: int = 1
+    setting: str = ""
+    value: str = ""
+    consequence: str = ""
+
+    @property
+    def id(self) -> str:
+        """Name of the run, the same for all seeds."""
+        return f"{self.name} {self.setting}".strip()
+
+    @property
+    def file(self) -> str:
+        """Name of the file of its state."""
+        return f"{self.id.replace(' ', '_')}-seed{self.seed}.npz"
+
+    @property
+    def settings(self) -> list[str]:
+        """Everything that is changed, as "key=value"."""
+        return [one for one in (self.setting, self.consequence) if one]
+
+    def load(self) -> InvasionCase:
+        """Its case."""
+        settings = [f"seed={self.seed}", *self.settings]
+        return with_fines(read_case(case_path(self.name), assignments=settings))
+
+
+def points() -> list[Planned]:
+    """All rows of plan.csv, one a seed; a scan also has the case itself, at its own value."""
+    rows = [vars(row) for row in rows_in("plan.csv")]
+    return [
+        Planned(seed=int(seed), **{name: text for name, text in row.items() if name != "seeds"})
+        for row in rows
+        for seed in row["seeds"].split()
+    ]
+
+
+def planned(*, quick: bool = False) -> list[Planned]:
+    """All runs, each once, or with `quick` one run of each quick form."""
+    if quick:
+        return [one for one in points() if one.group == "quick" and one.seed == 1]
+    runs: dict[tuple[str, int], Planned] = {}
+    for one in points():
+        runs.setdefault((one.id, one.seed), one)
+    return [*runs.values()]
+
+
+# ------------------------------------------------------------------------------------------------
+# The runs.
+
+
+def make_runs(
+    plan: Sequence[Planned], states: Path, runs: Path, *, jobs: int, show: bool
+) -> list[str]:
+    """Make the runs that have no state in `states`; returns what failed, one sentence each.
+
+    Cases with the same setting and seeds are one sweep in a folder of `runs`, which goes on where
+    it was cut. Two runs with the same invasion (Table 3 and specimen 7) are made once.
+    """
+    find_binary()
+    runs.mkdir(parents=True, exist_ok=True)
+    sweeps: dict[tuple[Any, ...], list[Planned]] = {}
+    invasions = set()
+    for item in plan:
+        invasion = item.load().digest("invade")
+        if find_state(states, item) is None and invasion not in invasions:
+            seeds = tuple(one.seed for one in plan if one.id == item.id)
+            sweeps.setdefault((item.group, seeds, *item.settings), []).append(item)
+        invasions.add(invasion)
+    failed = []
+    for (group, seeds, *settings), items in sweeps.items():
+        name = "-".join([group, *map(str, seeds), *settings])
+        name = "".join(one if one.isalnum() or one in ".-" else "-" for one in name)
+        cases = [str(case_path(one)) for one in dict.fromkeys(item.name for item in items)]
+        keys = {key: _value(text) for key, _, text in (one.partition("=") for one in settings)}
+        sweep = {"name": name, "cases": cases, "seeds": [*seeds], "set": keys}
+        file = write_text(runs / f"{name}.toml", tomli_w.dumps(sweep))
+        stages = ("pack", "invade", "analyse")
+        fdnet.sweep(file, out=runs / name, jobs=jobs, stages=stages, progress=show)
+        made = {}
+        for folder in (runs / name / "runs").iterdir():
+            try:
+                state = state_of_run(folder)
+                made[state.case.digest()] = state
+            except CaseError as error:
+                failed.append(str(error))
+        for item in items:
+            if item.load().digest() in made:
+                write_state(states / item.file, made[item.load().digest()])
+    return failed
+
+
+def _value(text: str) -> Any:
+    """A setting's value, as TOML reads it; a text without quotes as it is."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+# ------------------------------------------------------------------------------------------------
+# The states.
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class State:
+    """A specimen before and after its invasion.
+
+    Attributes:
+        case: the case of the run.
+        grains: the grains as packed, m.
+        damaged: the grains and all remaining fines at the end, those upstream too, m.
+        ending: numbers of fines `supplied` and `passed`; `stop_reason`; computing times `seconds`
+            of the invasion and `pack_seconds`; number of `steps` and their length `dt_s`;
+            `max_overlap` over the smaller diameter.
+    """
+
+    case: InvasionCase
+    grains: Snapshot
+    damaged: Snapshot
+    ending: Mapping[str, Any]
+
+
+def state_of_run(folder: Path) -> State:
+    """The end of a finished run. Raises CaseError when it is not finished, or was changed."""
+    run = fdnet.open_run(folder)
+    summary, invasion = run.summary, run.manifest["invade"]
+    names = ("stop_reason", "seconds", "steps", "dt_s", "max_overlap", "supplied")
+    return State(
+        case=with_fines(run.case),
+        grains=run.spheres("initial"),
+        damaged=run.spheres("damaged"),
+        ending={name: invasion[name] for name in names}
+        | {"passed": summary["passed_count"], "pack_seconds": run.manifest["pack"]["seconds"]},
+    )
+
+
+def write_state(path: Path, state: State) -> None:
+    """Keep a state in one compressed file of single precision (0.5 nm at 8 mm)."""
+    text = json.dumps({"case": state.case.toml(), "ending": dict(state.ending)})
+    arrays = {"text": np.frombuffer(text.encode(), np.uint8)}
+    for name, spheres in (("grains", state.grains), ("damaged", state.damaged)):
+        place = np.column_stack([spheres.position, spheres.radius])
+        arrays[f"{name}_place"] = place.astype(np.float32)
+        arrays[f"{name}_kind"] = spheres.kind.astype(np.uint8)
+        arrays[f"{name}_id"] = spheres.id.astype(np.uint32)
+    buffer = BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, buffer.getvalue())
+
+
+def read_state(path: Path) -> State:
+    """A state that `write_state` kept. Raises CaseError when the file is none."""
+    try:
+        with np.load(path) as file:
+            arrays = dict(file)
+        text = json.loads(arrays["text"].tobytes())
+        case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
+        grains, damaged = (_spheres(arrays, name, case) for name in ("grains", "damaged"))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise CaseError(
+            f"{path}: is no kept state ({error}); remove it and run the study anew"
+        ) from error
+    return State(case=case, grains=grains, damaged=damaged, ending=text["ending"])
+
+
+def find_state(states: Path, item: Planned) -> State | None:
+    """The kept state of a run, with the analysis options of its case today; None without one.
+
+    Table 3 has that of specimen 7, the same invasion. Raises CaseError for one of another case.
+    """
+    case = item.load()
+    twin = replace(item, name=item.name.replace(TABLE3, "specimen7"))
+    for path in (states / item.file, states / twin.file):
+        if path.exists():
+            state = read_state(path)
+            if state.case.digest("invade") == case.digest("invade"):
+                return replace(state, case=case)
+            if path.name == item.file:
+                raise CaseError(
+                    f"{path}: is the state of another case than {item.id}; remove it to run the "
+                    "case anew"
+                )
+    return None
+
+
+def _spheres(arrays: Mapping[str, Array], name: str, case: InvasionCase) -> Snapshot:
+    place, kind = arrays[f"{name}_place"].astype(float), arrays[f"{name}_kind"]
+    kind, radius = np.where(kind == Kind.GRAIN, Kind.GRAIN, Kind.FINE), place[:, 3]
+    for spheres, which in ((case.grains, Kind.GRAIN), (case.fines, Kind.FINE)):
+        if spheres.one_size:  # in full precision
+            radius = np.where(kind == which, spheres.mean_radius_m, radius)
+    box = [(0.0, side) for side in case.size_m]
+    made = Snapshot.from_arrays(place[:, :3], radius, box=box, kind=kind)
+    return replace(made, id=arrays[f"{name}_id"])
