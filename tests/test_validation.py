@@ -2,6 +2,9 @@
 
 import json
 import math
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -115,12 +118,6 @@ def test_an_error_within_its_band_is_not_resolved_and_says_how_many_seeds_would(
     assert judge.percent(level) == "+2 ± 5 %"
 
 
-def test_the_order_of_convergence_is_that_of_the_errors():
-    found = [Level(str(n), 1, 10.0 * n, -1 / (4 * n**2), 0.0) for n in (4, 8, 16)]
-    assert judge.order(found) == pytest.approx(2.0)
-    assert judge.order(found, by="value") == pytest.approx(2.0)
-
-
 def test_what_cannot_be_judged_is_refused_with_its_reason(tmp_path):
     table = rows(("s", "good", "1", 1.0), ("s", "poor", "1", 2.0))
     table.loc[0, ["status", "observed"]] = ["failed: no LIGGGHTS", np.nan]
@@ -232,14 +229,39 @@ def test_an_isolated_point_has_its_own_memory_and_a_time_limit(tmp_path, monkeyp
     table = solver.data["points"][0] | {"isolated": True, "decades": 0, "method": "spsolve"}
     one = solver._replace(data=solver.data | {"points": [table]})
     (tmp_path / "out").mkdir()
-    found = list(study.measured(one, tmp_path / "out", print))
-    assert {row["status"] for row in found} == {DONE}
-    assert 10.0 < found[0]["rss_mb"] < len(held) / 1e6
+    result = list(study.measured(one, tmp_path / "out", print))
+    assert {row["status"] for row in result} == {DONE}
+    assert 10.0 < result[0]["rss_mb"] < len(held) / 1e6
     monkeypatch.setattr(study, "LONGEST_S", 0.05)
     (tmp_path / "late").mkdir()
     assert [row["status"] for row in study.measured(one, tmp_path / "late", print)] == [
         "over time: more than 0.05 s"
     ]
+
+
+def test_a_killed_study_leaves_no_process(tmp_path):
+    """Also while a point computes in a process of its own."""
+    code = (
+        "import pathlib\nfrom validation import study\n"
+        "one = study.read_study('linear-solver')\n"
+        "points = [one.data['points'][-1] | {'isolated': True}]\n"
+        "list(study.measured(one._replace(data=one.data | {'points': points}),"
+        " pathlib.Path('.'), print))\n"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path)
+    children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children")
+    deadline = time.monotonic() + 60
+    while not (child := children.read_text().split()) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert child
+    time.sleep(2.0)
+    parent.kill()
+    parent.wait()
+    while Path(f"/proc/{child[0]}/cmdline").exists() and time.monotonic() < deadline:
+        if not Path(f"/proc/{child[0]}/cmdline").read_bytes():  # it has ended
+            break
+        time.sleep(0.05)
+    assert time.monotonic() < deadline
 
 
 def test_the_picture_of_every_kept_table_is_there_and_narrow_enough_for_a_phone(tmp_path):

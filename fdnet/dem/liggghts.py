@@ -462,7 +462,7 @@ class Feed:
             self._refuse()
             if self._ended():  # a daemon of MPI may keep the pipe open
                 raise _EndedError
-        self.peak_memory_bytes = max(self.peak_memory_bytes, resident_peak(self.process.pid))
+        self.peak_memory_bytes = max(self.peak_memory_bytes, peak_resident_bytes(self.process.pid))
         part = os.read(pipe, _PART)
         try:
             self.screen.write(part)
@@ -514,7 +514,7 @@ class Feed:
                 )
 
 
-def resident_peak(process: int | str = "self") -> int:
+def peak_resident_bytes(process: int | str = "self") -> int:
     """Largest resident memory, bytes, of a process since its program began; 0 if unknown.
 
     That of getrusage also counts what a process had as a copy of its parent.

@@ -24,7 +24,7 @@ from fdnet.dem.liggghts import (
     Execution,
     Launch,
     find_binary,
-    resident_peak,
+    peak_resident_bytes,
 )
 from fdnet.dem.packing import Pack
 from fdnet.errors import CaseError, Doubt, explained
@@ -231,7 +231,7 @@ def stage_costs(
         },
         "peak_memory_bytes": {
             "liggghts": None if None in peaks else max(peaks, default=0),
-            "python": resident_peak(),
+            "python": peak_resident_bytes(),
         },
     }
 

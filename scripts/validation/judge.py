@@ -20,6 +20,7 @@ file. They are written for readers, and computed anew whenever the table is read
 import math
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -104,9 +105,9 @@ def read_rows(path: Path) -> pd.DataFrame:
     return rows
 
 
-def rows_from(found: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+def rows_from(records: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """The table of rows that lack what is judged, and perhaps some costs."""
-    rows = pd.DataFrame(found, columns=list(COLUMNS))
+    rows = pd.DataFrame(records, columns=list(COLUMNS))
     numbers = [name for name in COLUMNS if name not in TEXTS]
     return rows.astype(dict.fromkeys(numbers, float) | dict.fromkeys(TEXTS, str))
 
@@ -165,13 +166,15 @@ def _errors(done: pd.DataFrame, rule: Rule, asked: pd.DataFrame) -> pd.DataFrame
     if rule.form in ("error", "size"):
         error = done.observed.abs() if rule.form == "size" else done.observed
         if rule.trials:
-            sd = [_half_of_wilson(share, rule.trials) / _OF_ONE_RUN for share in done.observed]
+            half = done.observed.map(lambda share: _half_of_wilson(share, rule.trials))
+            sd = half / _OF_ONE_RUN
         return pd.DataFrame({"error": error, "sd": sd, "shift": 0.0}, index=done.index)
     best = _reference(done, rule, asked)
     base = done[best].groupby("seed")["observed"].first()
     own = done.seed.map(base)
     if rule.form == "each":
-        sd = np.hypot(sd, done.seed.map(done[best].groupby("seed")["sd"].first()).fillna(0.0))
+        known = done.seed.map(done[best].groupby("seed")["sd"].first()).fillna(0.0)
+        sd = (sd**2 + known**2) ** 0.5
         error = (done.observed / own - 1.0).where(~best)
         return pd.DataFrame({"error": error, "sd": sd / own.abs(), "shift": 0.0})
     mean = float(base.mean())
@@ -215,9 +218,10 @@ def _bands(done: pd.DataFrame, errors: pd.DataFrame) -> pd.Series:
     count, scatter = groups["error"].transform("count"), groups["error"].transform("std")
     several = scatter * count.map(lambda n: _quantile(n) / math.sqrt(n) if n > 1 else math.nan)
     band = several.where(count > 1, _OF_ONE_RUN * errors.sd.fillna(0.0))
-    return np.hypot(band, errors["shift"]).where(errors.error.notna())
+    return ((band**2 + errors["shift"] ** 2) ** 0.5).where(errors.error.notna())
 
 
+@cache
 def _quantile(runs: int) -> float:
     """Student's t that the 95 % band of a mean of so many runs reaches."""
     return float(student.ppf(0.975, runs - 1)) if runs > 1 else _OF_ONE_RUN
@@ -257,13 +261,6 @@ def _mean(errors: pd.Series) -> float:
     """The mean; 0 where it is below the nine digits of the table."""
     mean = float(errors.mean())
     return 0.0 if abs(mean) < _NINE_DIGITS * errors.abs().max() else mean
-
-
-def order(found: Sequence[Level], *, by: str = "cost") -> float:
-    """Exponent p of error ~ cost^-p, or value^-p, by least squares over all levels."""
-    where = [float(getattr(level, by)) for level in found]
-    sizes = [abs(level.error) for level in found]
-    return -float(np.polyfit(np.log(where), np.log(sizes), 1)[0])
 
 
 def percent(level: Level) -> str:

@@ -81,7 +81,7 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     tolerance = 1e-8 if point.value == "own" else float(point.value)
     (flux, steps), seconds = least_time(lambda: solve_by(method, circuit, tolerance))
     inflow = circuit.out_of(flux, 0)
-    found = {
+    numbers = {
         "inflow": inflow,
         "residual": circuit.imbalance(flux) / inflow,
         "mass balance": abs(-circuit.out_of(flux, 1) / inflow - 1.0),
@@ -94,11 +94,11 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     elif pores <= SMALL or known.exists():
         exact = _exact(pores, decades, seed, work) if pores <= SMALL else np.load(known)
         truth = circuit.out_of(exact, 0)
-        found["inflow error"] = inflow / truth - 1.0
-        found["worst throat"] = float(np.abs(flux - exact).max()) / truth
+        numbers["inflow error"] = inflow / truth - 1.0
+        numbers["worst throat"] = float(np.abs(flux - exact).max()) / truth
         left = circuit.imbalance(exact) / truth
-        found |= {"inflow error ±": left, "worst throat ±": left}
-    return found
+        numbers |= {"inflow error ±": left, "worst throat ±": left}
+    return numbers
 
 
 @cache

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 CURVES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5A5A5A", "#8C564B")
 """Okabe and Ito (2008), which readers with any colour vision can tell apart."""
 MARKERS = "osD^vP<X"
-WIDTH, HEIGHT, DPI = 4.3, 2.3, 170
+WIDTH, HEIGHT, DPI = 3.6, 2.2, 190
 """Inches: a phone shows the whole width with letters of its own size."""
 COSTS = {"core_s": "core seconds", "steps": "steps"}
 
@@ -27,7 +27,7 @@ def draw(panels: Sequence[Mapping[str, Any]], rows: pd.DataFrame, path: Path) ->
     from matplotlib.figure import Figure
 
     shown = [panel for panel in panels if _series(panel, rows)]
-    with rc_context({"font.size": 7.5, "axes.titlesize": 8.5, "legend.fontsize": 6.5}):
+    with rc_context({"font.size": 7.5, "axes.titlesize": 7.5, "legend.fontsize": 6.5}):
         size = (WIDTH, HEIGHT * max(len(shown), 1))
         figure = Figure(figsize=size, layout="constrained")
         places = figure.subplots(max(len(shown), 1), squeeze=False)[:, 0]
@@ -44,12 +44,16 @@ def _series(panel: Mapping[str, Any], rows: pd.DataFrame) -> list[str]:
 
 def _draw_panel(axes: "Axes", panel: Mapping[str, Any], rows: pd.DataFrame) -> None:
     cost = panel.get("cost", "core_s")
-    found = {
+    by_series = {
         name: levels(rows, name, panel["quantity"], cost=cost) for name in _series(panel, rows)
     }
-    points = [one for of_series in found.values() for one in of_series]
+    points = [one for of_series in by_series.values() for one in of_series]
+    labels = [
+        name.removesuffix(panel.get("common", "")).removeprefix(panel.get("begin", ""))
+        for name in by_series
+    ]
     middle = math.sqrt(min(one.cost for one in points) * max(one.cost for one in points))
-    for number, (name, of_series) in enumerate(found.items()):
+    for number, of_series in enumerate(by_series.values()):
         colour = CURVES[number % len(CURVES)]
         axes.errorbar(
             [one.cost for one in of_series],
@@ -60,7 +64,7 @@ def _draw_panel(axes: "Axes", panel: Mapping[str, Any], rows: pd.DataFrame) -> N
             markersize=3.5,
             linewidth=0.8,
             capsize=1.5,
-            label=name.removesuffix(panel.get("common", "")),
+            label=labels[number],
         )
         for one in of_series:
             left = one.cost < 1.001 * middle
@@ -75,9 +79,15 @@ def _draw_panel(axes: "Axes", panel: Mapping[str, Any], rows: pd.DataFrame) -> N
             )
     _scale(axes, points, panel)
     axes.set(title=panel["title"], xlabel=COSTS[cost], ylabel=panel.get("label", "error, %"))
-    if len(found) > 1:
-        below = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.24)}
-        axes.legend(ncols=2, handletextpad=0.2, frameon=False, borderpad=0, **below)
+    if len(by_series) > 1:
+        axes.legend(
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.26),
+            ncols=1 if any(len(name) > 45 for name in labels) else 2,
+            handletextpad=0.2,
+            frameon=False,
+            borderpad=0,
+        )
 
 
 def _scale(axes: "Axes", points: Sequence[Level], panel: Mapping[str, Any]) -> None:
@@ -111,10 +121,14 @@ def _scale(axes: "Axes", points: Sequence[Level], panel: Mapping[str, Any]) -> N
 
 
 def _short(value: str) -> str:
+    """A value of a knob in few letters: 1e4, but 1,525."""
     try:
-        return f"{float(value):.3g}".replace("e+0", "e").replace("e-0", "e-")
+        number = float(value)
     except ValueError:
         return value
+    if number != float(f"{number:.3g}") and number.is_integer():
+        return f"{number:,.0f}"
+    return f"{number:.3g}".replace("e+0", "e").replace("e-0", "e-")
 
 
 def draw_answer(shortcuts: Sequence[Shortcut], path: Path) -> None:
@@ -135,7 +149,7 @@ def draw_answer(shortcuts: Sequence[Shortcut], path: Path) -> None:
             )
             words = f"{one.says}: {one.error_of}, {1 / one.saves:.2g} × time"
             where = axes.get_yaxis_transform()
-            axes.text(0.01, place + 0.26, words, fontsize=6.5, transform=where)
+            axes.text(0.01, place + 0.26, words, fontsize=6.2, transform=where)
         axes.axvline(0.0, color="black", linewidth=0.7)
         axes.set_xscale("symlog", linthresh=1.0)
         axes.set_xlim(-100, 100)

@@ -8,7 +8,6 @@ import resource
 import shutil
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,15 +27,15 @@ from fdnet.dem.deck import (
     write_data,
 )
 from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Binary, Launch, find_binary, run_deck
-from fdnet.dem.packing import make_pack
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.files import write_text
 from fdnet.scales.clock import relaxation_time
 from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import Scales, invasion_scales, scales_of
-from fdnet.spheres.dump import COLUMNS, read_dump, read_frame
+from fdnet.spheres.dump import COLUMNS, read_dump
 from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind, Snapshot, resting
+from validation.comparisons import packed, the_binary
 from validation.study import FOLDER, Point
 
 TEMPLATES = Path(__file__).with_name("templates")
@@ -60,15 +59,15 @@ def measure(point: Point, work: Path) -> Mapping[str, float]:
     shutil.rmtree(folder, ignore_errors=True)
     before = _child_seconds()
     if system == "collision":
-        found = collision(folder, stiffness=value, factor=0.1, phase=0.5)
+        numbers = collision(folder, stiffness=value, factor=0.1, phase=0.5)
     elif system == "four collisions":
-        found = _worst_collision(folder, value)
+        numbers = _worst_collision(folder, value)
     elif system == "undamped pack":
-        found = thrown_pack(folder, factor=value, seed=int(point.seed), spans=SPANS)
+        numbers = thrown_pack(folder, factor=value, seed=int(point.seed), spans=SPANS)
     else:
         scheme = str(point.settings.get("scheme", "every step"))
-        found = _fall(folder, scheme, value, int(point.settings.get("looks", 0)))
-    return found | {"core_s": _child_seconds() - before}
+        numbers = _fall(folder, scheme, value, int(point.settings.get("looks", 0)))
+    return numbers | {"core_s": _child_seconds() - before}
 
 
 def _child_seconds() -> float:
@@ -81,12 +80,6 @@ def slab_case(seed: int, *assignments: str) -> InvasionCase:
     """The studies' invasion with other settings, "key=value"."""
     path = FOLDER / "slab.toml"
     return with_fines(read_case(path, assignments=[f"seed={seed}", *assignments]))
-
-
-@cache
-def the_binary() -> Binary:
-    """LIGGGHTS, looked up once. Raises LiggghtsError when there is none."""
-    return find_binary()
 
 
 # ------------------------------------------------------------------------------------------------
@@ -202,7 +195,7 @@ def thrown_pack(
     """
     keys = ("grains.count=90", "box.size_mm=[2.0,2.0,2.1]", "grains.motion=mobile")
     case = slab_case(seed, *keys, f"grains.damping_ratio={damping!r}")
-    grains = grains_of(slab_case(seed, *keys[:2]), folder.parent)
+    grains = packed(slab_case(seed, *keys[:2]), folder.parent)
     scales, density = scales_of(case), case.grains.density_kg_m3
     mass = sphere_mass(case.grains.mean_radius_m, density)
     time = math.sqrt(mass / scales.contacts["grain-grain"].normal_stiffness)
@@ -220,19 +213,6 @@ def thrown_pack(
         "kinetic_left": float(kinetic[-1] / kinetic[0]),
         "steps": float(steps),
     }
-
-
-def grains_of(case: Case, work: Path) -> Snapshot:
-    """The case's grains, packed once in `work` for all with this seed, box and grains.
-
-    They are packed at the default stiffness. This holds for fixed grains only, whose place does
-    not depend on the stiffness (docs/physics.md).
-    """
-    plain = case.model_copy(update={"run": type(case.run)()})
-    folder = work / f"pack-{plain.digest('pack')}"
-    if not (folder / "attempts.json").exists():
-        make_pack(plain, scales_of(plain), folder, Launch(binary=the_binary()))
-    return snapshot_of(read_frame(folder / "post" / "pack.dump"), plain, time_s=0.0)
 
 
 def kinetic_energy(spheres: Snapshot, density: float) -> float:
@@ -304,8 +284,8 @@ def _fallen(
     """Largest error of the velocity of one free fine, over its terminal velocity v_T, and steps.
 
     The exact velocity is v_T (1 - exp(-t / tau)) with the relaxation time tau (Stokes 1851). The
-    step is `over_tau` tau (a twentieth of it where drag is held so long), the duration `spans` tau,
-    and the fine is looked at after every `chunk` tau.
+    step is `over_tau` tau, or a twentieth of it where drag is held so long. The duration is
+    `spans` tau, and the fine is looked at after every `chunk` tau.
     """
     radius, density, viscosity = 0.05e-3, 2146.0, 0.05
     tau = relaxation_time(radius, density, viscosity)

@@ -39,7 +39,7 @@ import tomli_w
 
 import fdnet
 from fdnet.case.file import toml_tables
-from fdnet.dem.liggghts import resident_peak
+from fdnet.dem.liggghts import peak_resident_bytes
 from fdnet.errors import CaseError, FdnetError
 from fdnet.files import path_option, refuse_folder_name, write_text
 from validation import judge
@@ -124,7 +124,7 @@ def measured(study: Study, out: Path, report: Callable[[str], None]) -> Iterator
     text = path.read_text(encoding="utf-8") if path.exists() else ""
     lines, cut = text.splitlines(), not text.endswith("\n") and bool(text)
     whole = [json.loads(line) for line in lines if line.endswith("]")]
-    known = {key: found for key, found in whole if found["status"] == judge.DONE}
+    known = {key: numbers for key, numbers in whole if numbers["status"] == judge.DONE}
     points = points_of(study)
     for number, point in enumerate(points, 1):
         key = json.dumps(point)
@@ -137,16 +137,16 @@ def measured(study: Study, out: Path, report: Callable[[str], None]) -> Iterator
         yield from rows_of_point(point, known[key])
 
 
-def rows_of_point(point: Point, found: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+def rows_of_point(point: Point, numbers: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """The rows of a point: one for each number that it found but the costs."""
-    row = {"series": point.series, "knob": point.knob, "seed": str(point.seed)}
-    row |= {"value": judge.shown(point.value)}
-    row |= {name: found.get(name) for name in (*judge.COSTS, "steps", "status")}
-    for name in found.keys() - row.keys():
+    row: dict[str, Any] = {"series": point.series, "knob": point.knob, "seed": str(point.seed)}
+    row["value"] = judge.shown(point.value)
+    row |= {name: numbers.get(name) for name in (*judge.COSTS, "steps", "status")}
+    for name in numbers.keys() - row.keys():
         if not name.endswith(judge.SD):
-            sd = found.get(name + judge.SD)
-            yield row | {"quantity": name, "observed": found[name], "sd": sd}
-    if found["status"] != judge.DONE:
+            sd = numbers.get(name + judge.SD)
+            yield row | {"quantity": name, "observed": numbers[name], "sd": sd}
+    if numbers["status"] != judge.DONE:
         yield row | {"quantity": ""}
 
 
@@ -171,14 +171,18 @@ def measure_point(study: Study, point: Point, work: Path) -> dict[str, Any]:
     """What a point found, its costs and its status; costs that it finds itself count."""
     before = _processors()
     try:
-        found, status = dict(study.measure(point, work)), judge.DONE
+        numbers, status = dict(study.measure(point, work)), judge.DONE
     except FdnetError as error:
         words = " ".join(str(error).split()).replace(f"{work}/", "").split("; ")[0]
-        found, status = {}, f"refused: {words}"
+        numbers, status = {}, f"refused: {words}"
     except MemoryError:
-        found, status = {}, "over memory"
-    costs = {"core_s": _processors() - before, "rss_mb": resident_peak() / 1e6, "steps": None}
-    return {**costs, **found, "status": status}
+        numbers, status = {}, "over memory"
+    costs = {
+        "core_s": _processors() - before,
+        "rss_mb": peak_resident_bytes() / 1e6,
+        "steps": None,
+    }
+    return {**costs, **numbers, "status": status}
 
 
 def least_time(work: Callable[[], Result], *, times: int = 3) -> tuple[Result, float]:
@@ -218,14 +222,14 @@ def swept(study: Study, out: Path, *, jobs: int | None, show: bool) -> Iterator[
     runs = fdnet.sweep(path, out=out / "sweep", jobs=jobs, stages=stages, progress=show).table
     numbers = runs.rename(columns=lambda name: name.replace(".", "_"))
     observed = {name: numbers.eval(text) for name, text in study.data["quantities"].items()}
-    for place, run in runs.iterrows():
-        name = names.get(run["variant"].split("+")[0], study.data.get("series", ""))
-        numbers_of_run = {quantity: one[place] for quantity, one in observed.items()}
-        yield from rows_of_run(study, name, run, numbers_of_run)
+    by_run = pd.DataFrame(observed, index=runs.index).to_dict("records")
+    for run, quantities in zip(runs.to_dict("records"), by_run, strict=True):
+        name = names.get(str(run["variant"]).split("+")[0], study.data.get("series", ""))
+        yield from rows_of_run(study, name, run, quantities)
 
 
 def rows_of_run(
-    study: Study, name: str, run: Mapping[str, Any], observed: Mapping[str, float]
+    study: Study, name: str, run: Mapping[Any, Any], observed: Mapping[Any, float]
 ) -> Iterator[dict[str, Any]]:
     """The rows of one run of the variant `name`, given as a row of the campaign's table."""
     series, _, value = name.partition(": ")
@@ -266,10 +270,10 @@ def run_study(
         raise CaseError(f"{out}: holds no study (no {POINTS}); give an empty or new folder")
     out.mkdir(parents=True, exist_ok=True)
     (out / POINTS).touch()
-    found = list(measured(study, out, report))
+    lines = list(measured(study, out, report))
     if "case" in study.data:
-        found += swept(study, out, jobs=jobs, show=show)
-    rows = judge.judged(judge.rows_from(found), study.rules)
+        lines += swept(study, out, jobs=jobs, show=show)
+    rows = judge.judged(judge.rows_from(lines), study.rules)
     judge.write_rows(rows, out / f"{study.name}.csv")
     draw(study.data["panel"], rows, out / f"{study.name}.png")
     return rows

@@ -23,7 +23,7 @@ from validation.small_systems import (
 )
 
 
-def found(work: Path, values, measure=measure, *, knob="k", seed=1, **settings) -> dict:
+def measured(work: Path, values, measure=measure, *, knob="k", seed=1, **settings) -> dict:
     """What `measure` finds at each value."""
     points = [study.Point("s", knob, value, seed, settings | {knob: value}) for value in values]
     return {point.value: measure(point, work) for point in points}
@@ -39,7 +39,7 @@ def order_of(results: dict, name: str, by: str = "steps") -> float:
 @pytest.mark.liggghts
 def test_overlap_falls_as_the_root_of_the_stiffness_up_to_the_nominal_value(tmp_path):
     """v sqrt(m_eff / k) exp(...) of a damped spring; restitution does not depend on it."""
-    result = found(tmp_path, (1e2, 1e4, 94.3e9), system="collision")
+    result = measured(tmp_path, (1e2, 1e4, 94.3e9), system="collision")
     fines = slab_case(1).fines
     mass, radius = sphere_mass(fines.mean_radius_m, fines.density_kg_m3), fines.mean_radius_m
     for value, one in result.items():
@@ -51,10 +51,10 @@ def test_overlap_falls_as_the_root_of_the_stiffness_up_to_the_nominal_value(tmp_
 
 @pytest.mark.liggghts
 def test_collisions_packs_and_drag_converge_in_their_orders(tmp_path):
-    worst = found(tmp_path, (0.4, 0.2, 0.1, 0.05), system="four collisions")
+    worst = measured(tmp_path, (0.4, 0.2, 0.1, 0.05), system="four collisions")
     assert order_of(worst, "restitution_error", by="value") == pytest.approx(1.1, abs=0.3)
     assert worst[0.1]["restitution_error"] < 0.03
-    pack = found(tmp_path, (0.4, 0.2, 0.1, 0.05), system="undamped pack")
+    pack = measured(tmp_path, (0.4, 0.2, 0.1, 0.05), system="undamped pack")
     assert order_of(pack, "energy_drift") == pytest.approx(2.0, abs=0.3)
     assert pack[0.1]["energy_drift"] < 1e-4
 
@@ -63,7 +63,7 @@ def test_collisions_packs_and_drag_converge_in_their_orders(tmp_path):
 def test_schemes_of_drag_have_the_errors_of_their_closed_forms(tmp_path):
     """After n = tau/h intervals h: ((2-h)/(2+h))^n implicit, (1-h)^n else, against exp(-1)."""
     for scheme in ("every step", "held", "viscous", "implicit"):
-        result = found(
+        result = measured(
             tmp_path / scheme.replace(" ", "_"), (0.2, 0.1, 0.05),
             system="falling fine", scheme=scheme, looks=1,
         )  # fmt: skip
@@ -75,10 +75,10 @@ def test_schemes_of_drag_have_the_errors_of_their_closed_forms(tmp_path):
             exact = pytest.approx(math.exp(-1) - left, rel=0.05 if implicit else 0.12)
             assert one["relaxation_error"] == exact, scheme
     far = {"system": "falling fine", "looks": 1}
-    bounded = found(tmp_path / "far", (10.0,), scheme="implicit", **far)
+    bounded = measured(tmp_path / "far", (10.0,), scheme="implicit", **far)
     assert bounded[10.0]["relaxation_error"] == pytest.approx(8 / 12, rel=0.01)
     with pytest.raises(CaseError, match=r"run\.time_step_s"):
-        found(tmp_path / "far", (2.0,), scheme="every step", **far)
+        measured(tmp_path / "far", (2.0,), scheme="every step", **far)
 
 
 def test_closed_forms_of_a_damped_contact():
@@ -113,11 +113,11 @@ def test_solvers_are_as_near_to_eighty_digits_as_their_tolerance_and_rounding(tm
     for decades, bound in ((0, 1e-10), (8, 1e-9), (16, 1e-6)):
         network = {"measure": linear_solver.measure, "pores": 200, "decades": decades, "seed": 0}
         for method in ("fdnet", "METIS + splu", "spsolve"):
-            one = found(tmp_path, ("own",), method=method, **network)["own"]
+            one = measured(tmp_path, ("own",), method=method, **network)["own"]
             assert one["worst throat"] < (1e-9 if method == "fdnet" else bound)
             assert abs(one["inflow error"]) < (1e-9 if method == "fdnet" else bound)
         for method in linear_solver.MOST_STEPS:
-            result = found(tmp_path, (1e-4, 1e-8, 1e-12), method=method, **network)
+            result = measured(tmp_path, (1e-4, 1e-8, 1e-12), method=method, **network)
             worst = [one["worst throat"] for one in result.values()]
             assert worst[0] > 100 * worst[1] > 1e4 * worst[2] > 0
             for one in result.values():  # both over the inflow of the solve
@@ -140,7 +140,7 @@ def test_a_chain_carries_its_series_conductance_and_steps_may_run_out(tmp_path, 
 
 def test_errors_of_the_velocity_fall_with_the_cells_and_points_lie_in_the_pores(tmp_path):
     pack = {"measure": velocity_field.measure, "pack": "C, porosity 0.40", "fine": 12.0}
-    result = found(tmp_path, (5.0, 7.0), **pack)
+    result = measured(tmp_path, (5.0, 7.0), **pack)
     for name in ("velocity", "throat fluxes"):
         assert 0.0 < result[7.0][name] < 0.7 * result[5.0][name]
     lattice = laws.known_case("SC c = 0.216").pack
@@ -156,13 +156,13 @@ def test_laws_have_the_errors_of_the_table_of_accuracy_and_resolved_flow_converg
         ("H_r5_d13", ("thesis + thesis", "lubrication + all-spheres")),
     ):
         name = "k/k0" if "+" in values[0] else "k"
-        law = found(tmp_path, ("truth", *values), laws.measure, knob="law", seed=pack)
+        law = measured(tmp_path, ("truth", *values), laws.measure, knob="law", seed=pack)
         for value in values:
             column = value if "+" in value else f"{value}: k0"
             over = law[value][name] / law["truth"][name]
             assert over == pytest.approx(float(known[pack][column]), abs=2e-4), (pack, value)
     truth = laws.known_case("H_40_eps40").k
-    grids = found(tmp_path, (16.0, 24.0), laws.measure, knob="cells", seed="H_40_eps40")
+    grids = measured(tmp_path, (16.0, 24.0), laws.measure, knob="cells", seed="H_40_eps40")
     two = laws.measure(study.Point("s", "cells", 24.0, "H_40_eps40", {"coarser": 2 / 3}), tmp_path)
     one = {cells: grid["k"] / truth - 1 for cells, grid in grids.items()}
     assert one[16.0] > 1.5 * one[24.0] > 0

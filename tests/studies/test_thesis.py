@@ -1,13 +1,12 @@
 """The specimens of the thesis, on a simple cubic lattice with fines placed by hand.
 
-Cells of edge A have grains of radius R = A/2 at their corners. Each cell is one pore of radius
-(sqrt(3)/2 - 1/2) A. Each square face is two throats (its triangles) on one axis, of length A and
-radius (1/sqrt(2) - 1/2) A. Layers of whole cells are centred at 0.6, 1.1 and 1.6 mm; the faces of
-the specimen cut the layers at the ends.
+Cells of edge A with grains of radius R = A/2 are pores of radius (sqrt(3)/2 - 1/2) A; their faces
+are two throats each, of length A and radius (1/sqrt(2) - 1/2) A. Layers of whole cells are centred
+at 0.6, 1.1 and 1.6 mm; the faces of the specimen cut the layers at the ends.
 """
 
 from dataclasses import replace
-from math import log10, nan, pi, sqrt
+from math import log10, pi, sqrt
 
 import numpy as np
 import pandas as pd
@@ -17,30 +16,16 @@ from builders import resting_spheres, tiny
 from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Kind
 from validation.thesis import command
-from validation.thesis.compare import half_width, mean_of, responses, rows_of, trends, verdict
+from validation.thesis import quantities as q
+from validation.thesis.compare import half_width, mean_of, responses, rows_of
 from validation.thesis.figures import Sources, draw_all
 from validation.thesis.published import published, reductions, specimen_of, thesis_of
-from validation.thesis.quantities import (
-    CUT,
-    FIELDS,
-    SINGLES,
-    WHOLE,
-    deposition,
-    examine,
-    first_section,
-    measure,
-    result_rows,
-    statistics,
-    wilson_interval,
-)
 from validation.thesis.runs import Planned, State, find_state, planned, read_state, write_state
 
-MM = 1e-3
-A, R = 0.5, 0.25
+MM, A, R = 1e-3, 0.5, 0.25
 TUBE = (1 / sqrt(2) - 0.5) * A
 WIDE, THIN, APART = 0.1, 0.02, 2e-4
-# x, y, z, radius in mm; all lie midway between two cells, some on the axis of the face's throats;
-# the three wide ones are a little apart, so that none lies inside others, which would leave it out
+# x, y, z, radius in mm, midway between two cells; the wide ones apart, so that none is left out
 FINES = [
     [0.6, 0.0, 0.25, 0.05],
     [0.6, 0.5 + 0.5, 0.25 + 0.08, THIN],
@@ -73,23 +58,24 @@ def state():
 
 @pytest.fixture(scope="module")
 def run(state):
-    return examine(ITEM, state)
+    return q.examine(ITEM, state)
 
 
-def test_the_plan_names_every_run_once_and_the_rows_are_of_it(root):
+@pytest.fixture(scope="module")
+def results(root):
+    return pd.read_csv(root / "docs/thesis/results.csv")
+
+
+def test_the_plan_names_every_run_once_and_the_rows_are_of_it(results):
     plan = {(one.id, one.seed) for one in planned()}
     assert len(plan) == len(planned()) == 145
-    rows = pd.read_csv(root / "docs/thesis/results.csv")
-    missing = plan - {*zip(rows.id, rows.seed, strict=True)}
-    assert missing == {
-        ("specimen1 run.stiffness_N_m=100.0", 2),
-        ("quick-specimen5 fines.count=3840", 2),
-    }
-    assert {*zip(rows.id, rows.seed, strict=True)} <= plan
+    made = {*zip(results.id, results.seed, strict=True)}
+    soft = ("specimen1 run.stiffness_N_m=100.0", 2)
+    assert (plan - made, made - plan) == ({soft, ("quick-specimen5 fines.count=3840", 2)}, set())
     assert all(one.load().seed == one.seed for one in planned(quick=True))
 
 
-def test_a_state_keeps_spheres_to_a_nanometre_and_a_wrong_one_is_refused(state, tmp_path):
+def test_a_state_is_kept_to_a_nanometre_and_a_wrong_one_refused(state, tmp_path):
     write_state(tmp_path / "a.npz", state)
     kept = read_state(tmp_path / "a.npz")
     assert (kept.case, kept.ending) == (state.case, state.ending)
@@ -103,35 +89,25 @@ def test_a_state_keeps_spheres_to_a_nanometre_and_a_wrong_one_is_refused(state, 
     (tmp_path / "a.npz").write_bytes((tmp_path / "a.npz").read_bytes()[:-200])
     with pytest.raises(CaseError, match=r"a\.npz: is no kept state"):
         read_state(tmp_path / "a.npz")
+    with pytest.raises(CaseError, match="holds no state and no results"):
+        command.main(["--redraw", "--out", str(tmp_path / "none")])
 
 
 def test_every_number_told_has_its_source():
-    for name, one in published()["specimens"].items():
-        told = {*one} - {"id", "porosity", "porosity_loss", "sources", "senses"}
-        told -= {"fine_diameter_mm", "fine_radius_mm", "grain_radius_mm"}
-        assert told == {*one["sources"]}, name
-    for one in (*published()["statistic"], *published()["deposition"]):
-        assert one["source"].startswith(("Figure", "Table", "section"))
-    for one in published()["statistic"]:
-        assert one["quantity"] in ({**FIELDS} if "between" in one else {**SINGLES})
+    told = (*published()["statistic"], *published()["deposition"])
+    assert all(one["source"].startswith(("Figure", "Table", "section")) for one in told)
     assert reductions(thesis_of("specimen5-5to6"))[:3] == [0.32, 0.047, 0.078]
-    assert [reductions(thesis_of(f"specimen{n}")) for n in (6, 2)] == [[0.40], []]
     names = ("quick-specimen5", "specimen1 fines.friction=0", "table3", "specimen10", "quick")
     assert [specimen_of(one) for one in names] == ["specimen5", "specimen1", "table3", "", ""]
 
 
 def test_fines_are_counted_by_depth(run):
-    rows = result_rows(run)
-    assert [(row["law"], row["damage_law"]) for row in rows] == [
-        ("thesis", "thesis"),
-        ("lubrication", "all-spheres"),
-    ]
-    row = rows[0]
+    row, own = q.result_rows(run)
+    assert (row["damage_law"], own["law"]) == ("thesis", "lubrication")
     assert (row["supplied_count"], row["invaded_count"], row["count_first_mm"]) == (8, 7, 6)
     assert row["invasion_depth_mm"] == pytest.approx(1.6)
     assert row["mean_depth_mm"] == pytest.approx((6 * 0.6 + 0.11 + 1.6) / 7)
     assert (row["fraction_first_0p25mm"], row["fraction_beyond_0p5mm"]) == (0, 1)
-    assert row["fraction_first_mm"] == pytest.approx(6 / 7)
     assert row["time_ms"] == pytest.approx(2.0)
     filled = ball(0.05) + 2 * ball(THIN) + ball(WIDE)  # three almost at one place count once
     assert row["porosity_loss_first_mm"] == pytest.approx(filled / 4.4, rel=0.02)
@@ -140,24 +116,22 @@ def test_fines_are_counted_by_depth(run):
 
 
 def test_sizes_of_the_lattice_and_parts_cut_by_the_face(run):
-    section = first_section(run, WHOLE)
+    section = q.first_section(run, q.WHOLE)
     # 16 cells; their faces across y and z, and those towards the second layer, at 0.85 mm
     assert section.weight["throat"].sum() == 2 * (32 + 16)
-    pore, throat = (sqrt(3) / 2 - 0.5) * A, TUBE
-    inscribed = "volume of the inscribed sphere of a pore"
-    sizes = {"pore radius": pore, "throat radius": throat, "throat length": A}
-    for name, size in (sizes | {inscribed: ball(pore)}).items():
-        assert measure(section, name, (0.999 * size, 1.001 * size)) == (1.0, "share")
-        assert measure(section, name, (0.0, 0.999 * size)) == (0.0, "share")
-    cut = first_section(run, CUT)
+    pore = (sqrt(3) / 2 - 0.5) * A
+    sizes = {"pore radius": pore, "throat radius": TUBE, "throat length": A}
+    for name, size in sizes.items():
+        assert q.measure(section, name, (0.999 * size, 1.001 * size)) == (1.0, "share")
+        assert q.measure(section, name, (0.0, 0.999 * size)) == (0.0, "share")
+    cut = q.first_section(run, q.CUT)
     filled = np.sum(cut.weight["pore"] * cut.network.pore_tetra_volume)
     assert filled == pytest.approx((0.35 + A) * 4.0 * MM**3)  # 0.35 mm of the layer at the face
 
 
 def test_fines_in_throats_and_bodies(run):
-    section = first_section(run, WHOLE)
-    tube, bodies = pi * TUBE**2 * A, ball(0.05) + 2 * ball(THIN) + 3 * ball(WIDE)
-    occupancy = run.thesis.occupancy
+    section, occupancy = q.first_section(run, q.WHOLE), run.thesis.occupancy
+    bodies = ball(0.05) + 2 * ball(THIN) + 3 * ball(WIDE)
     # what lies of the third fine in its throats: the only one not wholly inside
     third = 1e9 * occupancy.pair_volume[np.isclose(occupancy.pair_distance, 0.11 / TUBE)]
     throats = 2 * (ball(0.05) + ball(THIN) + 3 * ball(WIDE)) + third.sum()
@@ -169,121 +143,78 @@ def test_fines_in_throats_and_bodies(run):
         "volume of fines in throats": throats,
         "volume of fines in pore bodies": bodies,
         "share of throats in the volume of fines": throats / (throats + bodies),
-        "overall throat porosity": 1 - throats / (96 * tube),
+        "overall throat porosity": 1 - throats / (96 * pi * TUBE**2 * A),
         "overall pore-body porosity": 1 - bodies / (16 * (A**3 - ball(R))),
-        "mean porosity of throats with fines": 1 - throats / (8 * tube),
+        "mean porosity of throats with fines": 1 - throats / (8 * pi * TUBE**2 * A),
     }
-    assert {name: measure(section, name, None)[0] for name in SINGLES} == pytest.approx(expected)
-    rows = [*statistics(run)]
-    mine = [one for one in published()["statistic"] if one["specimen"] == "5"]
-    assert len([row for row in rows if row["source"]]) == 2 * len(mine)
+    found = {name: q.measure(section, name, None)[0] for name in q.SINGLES}
+    assert found == pytest.approx(expected)
 
 
 def test_deposition_by_throat_porosity(run):
-    rows = {(row["low"], row["high"]): row for row in deposition(run)}
-    clogged, middle, open_ = rows[0.0, 0.4], rows[0.4, 0.6], rows[0.6, 1.0]
+    rows = {(row["low"], row["high"]): row for row in q.deposition(run)}
+    clogged, open_ = rows[0.0, 0.4], rows[0.6, 1.0]
     names = ("throats", "fines", "nearer_axis", "law", "decided", "nearer", "thesis")
     assert [clogged[one] for one in names] == [2, 6, 1.0, "clogging", True, "axis", 0.5]
-    assert (middle["fines"], middle["law"], middle["decided"]) == (0, "", False)
     shares = [open_[one] for one in ("nearer_axis", "nearer_wall", "beyond_wall")]
     assert shares == pytest.approx([1 / 3, 1 / 3, 1 / 3])
     assert (open_["law"], open_["decided"]) == ("deposition", False)  # 4 of 6 prove nothing
-    volumes = open_["nearer_axis_volume"] / open_["nearer_wall_volume"]
-    assert volumes == pytest.approx((0.05 / THIN) ** 3)
 
 
 def test_intervals_of_the_textbooks():
     """Wilson's of 8 in 10; Student's t is 4.3027 for 2 degrees of freedom, 2.7764 for 4."""
-    low, high = wilson_interval(8, 10)
-    assert (low, high) == pytest.approx((0.4902, 0.9433), abs=1e-4)
-    assert wilson_interval(2, 10) == pytest.approx((1 - high, 1 - low))
+    assert q.wilson_interval(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
     one, other = mean_of([1.0, 2.0, 3.0]), mean_of([4.0, 5.0, 6.0])
     assert half_width(one) == pytest.approx(4.3027 / sqrt(3), rel=1e-4)
     assert half_width(one, other) == pytest.approx(2.7764 * sqrt(2 / 3), rel=1e-4)
     lent = mean_of([10.0], [1.0, 2.0, 3.0], grows=True)  # its quick form's spread, widened
     assert (lent.spread, lent.variance) == ("quick form", pytest.approx(25.0))
-    assert np.isnan(half_width(mean_of([10.0])))
-    assert [verdict("more", *ends) for ends in ((1, 2), (-2, -1), (-1, 1))] == [
-        "holds",
-        "does not hold",
-        "not decided",
-    ]
-    assert [verdict("alike", *ends, 1) for ends in ((-0.5, 1), (1.5, 2), (0, 2))] == [
-        "holds",
-        "does not hold",
-        "not decided",
-    ]
 
 
-def test_trends_on_rows_whose_differences_are_known(root):
+def test_drag_response_keeps_to_each_pack(results):
     """Depths of the seeds are 1, 2 and 3 mm apart, slopes 0.49, 0.50 and 0.51 a decade."""
-    base = pd.read_csv(root / "docs/thesis/results.csv").iloc[0].to_dict()
-    rows = [
-        base
-        | {"id": f"quick-specimen5 drag.multiplier={x}" if x != 1 else "quick-specimen5"}
-        | {"seed": seed, "mean_depth_mm": seed + (0.48 + 0.01 * seed) * log10(x)}
-        for seed in (1, 2, 3)
-        for x in (0.1, 1, 10)
-    ]
-    rows += [base | {"id": "specimen5", "k_reduction_1": nan}]
-    results = pd.DataFrame(rows)
-    response = "mean depth per decade of drag"
-    assert responses(results, "quick-specimen5", response) == pytest.approx([0.49, 0.50, 0.51])
-    (slope,) = [one for one in trends(results) if one["quantity"] == response]
-    assert (slope["difference"], slope["verdict"]) == (pytest.approx(0.5), "holds")
-    assert slope["high"] - slope["difference"] == pytest.approx(4.3027 * 0.01 / sqrt(3), rel=1e-3)
-    notes = {one["note"] for one in trends(results)}
-    assert "no run of specimen1" in notes
+    base, rows = results.iloc[0].to_dict(), []
+    for seed, x in ((seed, x) for seed in (1, 2, 3) for x in (0.1, 1, 10)):
+        depth = seed + (0.48 + 0.01 * seed) * log10(x)
+        name = f"quick-specimen5 drag.multiplier={x}" if x != 1 else "quick-specimen5"
+        rows.append(base | {"id": name, "seed": seed, "mean_depth_mm": depth})
+    of = ("quick-specimen5", "mean depth per decade of drag")
+    assert responses(pd.DataFrame(rows), *of) == pytest.approx([0.49, 0.50, 0.51])
 
 
-def test_every_figure_is_drawn_small(run, root, tmp_path):
+@pytest.mark.nightly
+def test_every_figure_is_drawn_small(run, results, tmp_path):
     names = [f"specimen{number}" for number in range(1, 9)]
     runs = {name: [replace(run, item=replace(ITEM, name=name))] * 2 for name in names}
-    results = pd.read_csv(root / "docs/thesis/results.csv")
-    table = draw_all(Sources(runs, results), tmp_path)
-    numbers = {*map(str, [*range(14, 23), 42, *range(44, 73)])}
-    assert numbers <= {*table.figure}
+    figures = {one["figure"] for one in draw_all(Sources(runs, results), tmp_path)}
+    assert {*map(str, [*range(14, 23), 42, *range(44, 73)])} <= figures
     drawn = {path.stem.removeprefix("figure_") for path in tmp_path.glob("*.png")}
-    assert drawn == {*table.figure[table.missing == ""]}
-    assert {*table.figure} - drawn == {"57"}  # no fine lies in a throat of that class here
+    assert figures - drawn == {"57"}  # no fine lies in a throat of that class here
     assert all(path.stat().st_size < 100_000 for path in tmp_path.glob("*.png"))
-
-
-def test_nothing_to_redraw_is_told(tmp_path):
-    with pytest.raises(CaseError, match="holds no state and no results"):
-        command.main(["--redraw", "--out", str(tmp_path / "none")])
-    with pytest.raises(CaseError, match="--jobs: 0"):
-        command.main(["--jobs", "0", "--out", str(tmp_path / "none")])
-    assert not (tmp_path / "none").exists()
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["specimen1", "specimen5"])
-def test_a_kept_state_gives_its_rows_again(root, name):
+def test_a_kept_state_gives_its_rows_again(root, results, name):
     """Whatever the processor: sorts and roots that differ between instruction sets are avoided."""
     item = replace(ITEM, name=name)
-    state = find_state(root / "docs/thesis/states", item)
-    kept = pd.read_csv(root / "docs/thesis/results.csv")
-    for row in result_rows(examine(item, state)):
-        known = rows_of(kept, name, f"{row['law']}, {row['damage_law']}").iloc[0]
-        for column, value in row.items():
-            if isinstance(value, float):
-                exact = {"rel": 1e-6, "abs": 1e-9, "nan_ok": True}
-                assert value == pytest.approx(known[column], **exact), column
+    for row in q.result_rows(q.examine(item, find_state(root / "docs/thesis/states", item))):
+        known = rows_of(results, name, f"{row['law']}, {row['damage_law']}").iloc[0]
+        for column in (one for one, value in row.items() if isinstance(value, float)):
+            wanted = pytest.approx(known[column], rel=1e-6, abs=1e-9, nan_ok=True)
+            assert row[column] == wanted, column
 
 
 @pytest.mark.liggghts
 @pytest.mark.nightly
 def test_quick_forms_run_to_their_end_and_are_drawn_again(binary, tmp_path, monkeypatch):
-    plan = [one for one in planned(quick=True) if one.name in ("quick-specimen1", "quick-table3")]
+    plan = [one for one in planned(quick=True) if one.name in ("quick-specimen7", "quick-table3")]
     monkeypatch.setattr(command, "planned", lambda quick: plan)
-    out = tmp_path / "out"
-    words = ["--quick", "--out", str(out), "--runs", str(tmp_path / "runs"), "--silent"]
-    assert command.main(words) == 0
-    results = pd.read_csv(out / "results.csv")
-    assert [*results.id[::2]] == [one.id for one in plan]
-    assert results.k_reduction.between(0, 1).all()
-    before = (out / "results.csv").read_bytes()
-    (out / "states" / plan[0].file).unlink()
+    words = ["--quick", "--out", str(tmp_path / "out"), "--runs", str(tmp_path / "runs")]
+    assert command.main([*words, "--silent"]) == 0
+    table = tmp_path / "out" / "results.csv"
+    assert [*pd.read_csv(table).id[::2]] == [one.id for one in plan]
+    before = table.read_bytes()
+    (tmp_path / "out" / "states" / plan[0].file).unlink()
     assert command.main([*words, "--redraw"]) == 0
-    assert (out / "results.csv").read_bytes() == before
+    assert table.read_bytes() == before

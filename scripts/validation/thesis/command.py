@@ -69,7 +69,7 @@ def write_all(plan: Sequence[Planned], out: Path, states: Path) -> pd.DataFrame:
     Rows of an earlier results.csv stay where a run has no state, or none by those laws today. Runs
     of specimens and variants are drawn, or the quick forms when there is nothing else.
     """
-    kept = pd.read_csv(out / "results.csv") if (out / "results.csv").exists() else None
+    kept: Any = pd.read_csv(out / "results.csv") if (out / "results.csv").exists() else None
     results: list[dict[str, Any]] = []
     runs: list[Run] = []
     for item in plan:
@@ -81,7 +81,7 @@ def write_all(plan: Sequence[Planned], out: Path, states: Path) -> pd.DataFrame:
                 runs.pop()
         known = {(one["law"], one["damage_law"]) for one in rows}
         if kept is not None:
-            mine = kept[(kept.id == item.id) & (kept.seed == item.seed)].to_dict("records")
+            mine: Any = kept[(kept.id == item.id) & (kept.seed == item.seed)].to_dict("records")
             rows += [one for one in mine if (one["law"], one["damage_law"]) not in known]
         results += rows
     if not results:
@@ -94,7 +94,7 @@ def write_all(plan: Sequence[Planned], out: Path, states: Path) -> pd.DataFrame:
     path = out / "statistics.csv"
     if path.exists():  # what earlier scripts measured in another way stays
         readings = {row["note"].split(";")[0] for row in measured}
-        earlier = pd.read_csv(path, keep_default_na=False).to_dict("records")
+        earlier: Any = pd.read_csv(path, keep_default_na=False).to_dict("records")
         measured += [row for row in earlier if row["note"].split(";")[0] not in readings]
     _write(path, measured)
     _write(out / "deposition.csv", [row for run in runs for row in deposition(run)])

@@ -7,7 +7,6 @@ its quick form, which is cautious: that has a sixth of the cross-section.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,15 +15,19 @@ from scipy.stats import spearmanr
 from scipy.stats import t as student
 
 from fdnet.case.file import QUICK
+from fdnet.spheres.snapshot import Array
 from validation.thesis.published import (
     SPECIMENS,
     TABLE3,
     in_words,
     reductions,
+    rows_in,
     thesis_of,
 )
 from validation.thesis.quantities import SECTIONS
 
+Table = Any
+"""Rows of results.csv as a pandas table, or a column of it."""
 LAWS = ("thesis, thesis", "lubrication, auto", "lubrication, all-spheres")
 """The thesis's laws, an earlier default of fdnet (rows of earlier scripts), and that of today."""
 HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "not decided"
@@ -33,12 +36,7 @@ MARGIN, OVERLAP, PASSED, ROUNDING = 0.20, 0.05, 0.05, 1e-9
 fines passed through above which a remark is made. Differences that count as none."""
 
 
-QUANTITIES: Mapping[str, Any] = {
-    row.quantity: row
-    for row in pd.read_csv(
-        Path(__file__).with_name("quantities.csv"), keep_default_na=False
-    ).itertuples()
-}
+QUANTITIES: Mapping[str, Any] = {row.quantity: row for row in rows_in("quantities.csv")}
 """The quantities of a run by name, from quantities.csv.
 
 `values` gives one from rows of results.csv, in its `unit`; `thesis` is the thesis's number of it,
@@ -47,21 +45,22 @@ spread is widened, and may be too small when fines pass through (`deep`).
 """
 
 
-def values_in(rows: pd.DataFrame, quantity: str) -> pd.Series:
+def values_in(rows: Table, quantity: str) -> Table:
     """(R,) a quantity from R rows of results.csv."""
-    deep, others = ([f"k_reduction_{i}" for i in range(2, last + 1)] for last in (4, SECTIONS))
-    total = rows.k_reduction_1 + rows[deep].sum(axis=1)
-    more = {
-        "k_1_to_4_mm": rows[deep].mean(axis=1),
-        "k_beyond_1_mm": rows[others].max(axis=1),
-        "k_sum_to_4_mm": total.where(total > 0),
-    }
-    return rows.assign(**more).eval(QUANTITIES[quantity].values).astype(float)
+    if QUANTITIES[quantity].by_law:
+        deep, others = ([f"k_reduction_{i}" for i in range(2, last + 1)] for last in (4, SECTIONS))
+        total = rows.k_reduction_1 + rows[deep].sum(axis=1)
+        rows = rows.assign(
+            k_1_to_4_mm=rows[deep].mean(axis=1),
+            k_beyond_1_mm=rows[others].max(axis=1),
+            k_sum_to_4_mm=total.where(total > 0),
+        )
+    return rows.eval(QUANTITIES[quantity].values).astype(float)
 
 
 def told(run: str, quantity: str) -> str:
     """The thesis's number of a quantity in its unit, as text; "" where it has none."""
-    name, scale = QUANTITIES[quantity].thesis, QUANTITIES[quantity].scale
+    name, scale = QUANTITIES[quantity].thesis, float(QUANTITIES[quantity].scale)
     one = thesis_of(run)
     values = reductions(one)[:1] if name == "section_reduction" else one.get(name, [])
     sense = one.get("senses", {}).get(name.replace("section", "first_section"), "")
@@ -69,15 +68,13 @@ def told(run: str, quantity: str) -> str:
     return " or ".join(in_words(sense, value, scale) for value in values)
 
 
-def rows_of(results: pd.DataFrame, run: str, laws: str = LAWS[0]) -> pd.DataFrame:
+def rows_of(results: Table, run: str, laws: str = LAWS[0]) -> Table:
     """The rows of one run by one pair of laws, in the order of the seeds."""
     chosen = (results.id == run) & (results.law + ", " + results.damage_law == laws)
     return results[chosen].sort_values("seed")
 
 
-def values_of(
-    results: pd.DataFrame, run: str, quantity: str, laws: str = LAWS[0]
-) -> "np.ndarray[Any, Any]":
+def values_of(results: Table, run: str, quantity: str, laws: str = LAWS[0]) -> Array:
     """(S,) a quantity over the seeds of a run, without unknown values."""
     return values_in(rows_of(results, run, laws), quantity).dropna().to_numpy()
 
@@ -92,7 +89,7 @@ class Mean(NamedTuple):
     mean: float
     variance: float = math.nan
     freedom: int = 0
-    count: int = 0
+    seeds: int = 0
     spread: str = ""
 
 
@@ -105,7 +102,7 @@ def mean_of(values: Any, lent: Any = (), *, grows: bool = False) -> Mean:
         return Mean(math.nan)
     mean, own = float(np.mean(values)), len(values) >= 3
     if not own and len(lent) < 3:
-        return Mean(mean, count=len(values))
+        return Mean(mean, seeds=len(values))
     used, factor = (values, 1.0) if own else (lent, 1.0)
     if not own and grows and np.mean(lent) > 0:
         factor = max(1.0, mean / float(np.mean(lent)))
@@ -142,7 +139,7 @@ TABLES: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
 """The runs next to each of the thesis's tables, and the quantities, or k by section."""
 
 
-def tables(results: pd.DataFrame) -> Iterator[dict[str, Any]]:
+def tables(results: Table) -> Iterator[dict[str, Any]]:
     """Rows of tables.csv: each number of the thesis's tables next to ours with its band."""
     for table, (runs, names) in TABLES.items():
         for run in runs:
@@ -160,12 +157,12 @@ def tables(results: pd.DataFrame) -> Iterator[dict[str, Any]]:
                             "thesis": given,
                             "ours": mean.mean,
                             "half_width": half_width(mean),
-                            "seeds": mean.count,
+                            "seeds": mean.seeds,
                             "ended_by": ", ".join(dict.fromkeys(rows.stop_reason)),
                         }
 
 
-def _cells(rows: pd.DataFrame, run: str, names: Sequence[str]) -> Iterator[tuple[Any, ...]]:
+def _cells(rows: Table, run: str, names: Sequence[str]) -> Iterator[tuple[Any, ...]]:
     given = [f"{100 * one:.6g}" for one in reductions(thesis_of(run))] + [""] * SECTIONS
     for name in names:
         if name in QUANTITIES:
@@ -188,28 +185,28 @@ RESPONSES: Mapping[str, tuple[str, str]] = {
 """How a quantity answers to the drag: the quantity, and the unit of the response."""
 
 
-def trends(results: pd.DataFrame) -> list[dict[str, Any]]:
+def trends(results: Table) -> list[dict[str, Any]]:
     """Rows of trends.csv: every comparison of claims.csv at full scale and in the quick forms.
 
     `one` has "more" than `other`, is "alike" within MARGIN, or lies "above" the bound. The bound
     of trend 1 is the share that the thesis's specimen 1 has in its first millimetre.
     """
-    claims = pd.read_csv(Path(__file__).with_name("claims.csv"), keep_default_na=False)
+    claims = rows_in("claims.csv")
     made = []
     for scale, prefix in (("full scale", ""), ("quick forms", QUICK)):
-        for claim in claims.itertuples():
+        for claim in claims:
             name = RESPONSES.get(claim.quantity, (claim.quantity,))[0]
             names = [prefix + one for one in (claim.one, claim.other) if one]
             if claim.quantity in RESPONSES and not responses(results, names[0], claim.quantity):
                 continue
             for laws in LAWS if QUANTITIES[name].by_law else ("",):
                 if laws != LAWS[2] or any(len(rows_of(results, one, laws)) for one in names):
-                    made.append({"trend": claim.trend, "scale": scale, "laws": laws})
+                    made.append({"trend": int(claim.trend), "scale": scale, "laws": laws})
                     made[-1] |= _compared(results, claim, names, laws or LAWS[0])
     return sorted(made, key=lambda row: row["trend"])
 
 
-def responses(results: pd.DataFrame, run: str, response: str) -> list[float]:
+def responses(results: Table, run: str, response: str) -> list[float]:
     """How a quantity answers to the drag, one value for each seed with three multipliers or more.
 
     A slope is of least squares over the decimal logarithm of the multiplier; a rank correlation is
@@ -218,7 +215,7 @@ def responses(results: pd.DataFrame, run: str, response: str) -> list[float]:
     rows = results[results.law + ", " + results.damage_law == LAWS[0]]
     scanned = rows.id.str.extract(r"^(\S+) drag\.multiplier=(\S+)$")
     x = scanned[1].astype(float).where(rows.id != run, 1.0)
-    table = pd.DataFrame({"x": np.log10(x), "seed": rows.seed})
+    table: Table = pd.DataFrame({"x": np.log10(x), "seed": rows.seed})
     table["y"] = values_in(rows, RESPONSES[response][0])
     made = []
     for _, one in table[(rows.id == run) | (scanned[0] == run)].dropna().groupby("seed"):
@@ -230,11 +227,9 @@ def responses(results: pd.DataFrame, run: str, response: str) -> list[float]:
     return made
 
 
-def _compared(
-    results: pd.DataFrame, claim: Any, names: Sequence[str], laws: str
-) -> dict[str, Any]:
+def _compared(results: Table, claim: Any, names: Sequence[str], laws: str) -> dict[str, Any]:
     means = [_mean(results, name, claim.quantity, laws) for name in names]
-    values = [one.mean for one in means] + ([] if claim.other else [claim.bound])
+    values = [one.mean for one in means] + ([] if claim.other else [float(claim.bound)])
     gap, half = values[0] - values[1], half_width(*means)
     margin = MARGIN * max(values) if claim.sense == "alike" else math.nan
     name, *unit = RESPONSES.get(claim.quantity, (claim.quantity,))
@@ -251,21 +246,21 @@ def _compared(
         "high": gap + half,
         "margin": margin,
         "verdict": verdict(claim.sense, gap - half, gap + half, margin),
-        "runs_one": means[0].count,
-        "runs_other": means[1].count if claim.other else 0,
+        "runs_one": means[0].seeds,
+        "runs_other": means[1].seeds if claim.other else 0,
         "spread": "; ".join(dict.fromkeys(one.spread for one in means if one.spread)),
-        "note": "; ".join(_notes(results, names, claim, deep=QUANTITIES[name].deep)),
+        "note": "; ".join(_notes(results, names, claim, deep=bool(QUANTITIES[name].deep))),
     }
 
 
-def _mean(results: pd.DataFrame, run: str, quantity: str, laws: str) -> Mean:
+def _mean(results: Table, run: str, quantity: str, laws: str) -> Mean:
     samples = [
         responses(results, name, quantity)
         if quantity in RESPONSES
         else values_of(results, name, quantity, laws)
         for name in (run, *([] if run.startswith(QUICK) else [QUICK + run]))
     ]
-    grows = quantity in QUANTITIES and QUANTITIES[quantity].grows
+    grows = bool(quantity in QUANTITIES and QUANTITIES[quantity].grows)
     return mean_of(*samples, grows=grows)
 
 
@@ -278,9 +273,7 @@ def verdict(sense: str, low: float, high: float, margin: float = math.nan) -> st
     return HOLDS if low > ROUNDING else FAILS if high < -ROUNDING else UNDECIDED
 
 
-def _notes(
-    results: pd.DataFrame, names: Sequence[str], claim: Any, *, deep: bool
-) -> Iterator[str]:
+def _notes(results: Table, names: Sequence[str], claim: Any, *, deep: bool) -> Iterator[str]:
     """What weakens a comparison: missing runs, runs that did not plug, fines that passed."""
     if claim.quantity in RESPONSES:
         scanned = results.id.str.startswith(f"{names[0]} drag.multiplier=")

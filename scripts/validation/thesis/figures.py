@@ -6,8 +6,8 @@ and dotted lines in black are the thesis's numbers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from validation.thesis.compare import QUANTITIES, values_of
 from validation.thesis.published import (
     published,
     reductions,
+    rows_in,
     specimen_of,
     statistics_of,
     thesis_of,
@@ -40,7 +41,7 @@ COLOURS = ("", BLUE, GREEN, ORANGE, "#56B4E9", "#E69F00", "#000000", "#CC79A7", 
 """Of specimens 1 to 8 (Okabe and Ito 2008)."""
 MARK: Any = {"color": "black", "marker": "D", "markerfacecolor": "white", "linestyle": ""}
 MARK |= {"zorder": 5, "clip_on": False}
-LOST, SHARE = "porosity lost", "share of the invaded fines per 0.25 mm"
+LOST, SHARE = "porosity lost", "share of the fines per 0.25 mm"
 
 
 class Sources(NamedTuple):
@@ -55,28 +56,24 @@ class Sources(NamedTuple):
     results: pd.DataFrame
 
 
-def draw_all(sources: Sources, folder: Path) -> pd.DataFrame:
+def draw_all(sources: Sources, folder: Path) -> list[dict[str, str]]:
     """Draw every panel that has its sources; returns the panels with what is `missing` of each."""
-    table = pd.read_csv(
-        Path(__file__).with_name("panels.csv"), keep_default_na=False, dtype={"figure": str}
-    )
-    table["missing"] = ""
-    for place, row in enumerate(table.to_dict("records")):
-        lists = {name: row[name].split("|") for name in ("names", "specimens")}
-        panel = SimpleNamespace(**row | lists)
-        needed = panel.specimens if panel.kind != "scan" else ()
-        missing = [name for name in needed if not sources.runs.get(name)]
-        scanned = {one.id for one in points() if one.group == panel.specimens[0] and one.setting}
-        if panel.kind == "scan" and not sources.results.id.isin(scanned).any():
-            missing.append("runs")
+    rows = []
+    for panel in rows_in("panels.csv"):
+        rows.append(dict(vars(panel)))
+        panel.names, panel.specimens = panel.names.split("|"), panel.specimens.split("|")
+        missing = [one for one in panel.specimens if not sources.runs.get(one)]
+        if panel.kind == "scan":
+            ids = [o.id for o in points() if o.group == panel.specimens[0] and o.setting]
+            missing = [] if sources.results.id.isin(ids).any() else ["runs"]
         if panel.kind == "distance" and not missing and not len(_distances(panel, sources)):
-            missing.append("fines in such throats")
-        table.loc[place, "missing"] = "; ".join(missing)
+            missing = ["fines in such throats"]
+        rows[-1]["missing"] = "; ".join(missing)
         if not missing:
             path = folder / f"figure_{panel.figure}.png"
-            draw(path, lambda figure, panel=panel: KINDS[panel.kind](figure, panel, sources))
+            draw(path, partial(KINDS[panel.kind], panel=panel, sources=sources))
             _with_few_colours(path)
-    return table
+    return rows
 
 
 def _with_few_colours(path: Path) -> None:
@@ -87,22 +84,23 @@ def _with_few_colours(path: Path) -> None:
         picture.convert("RGB").quantize(64, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
-def _axes(figure: Any, panel: Any, count: int = 1, *, high: float = 3.7, **more: Any) -> Any:
-    """Axes side by side; one is 5 inches wide, so that a phone can show it."""
-    figure.set_size_inches(5.0 if count == 1 else 3.3 * count, high)
+def _axes(figure: Any, panel: Any, count: int = 1, **more: Any) -> Any:
+    """Axes below each other, so narrow that a phone can show them."""
+    figure.set_size_inches(5.0, 3.7 if count == 1 else 1.2 + 2.2 * count)
     figure.set_dpi(160)
-    made = figure.subplots(1, count, squeeze=False, **more)[0]
+    made = figure.subplots(count, 1, squeeze=False, sharex=True, **more)[:, 0]
+    made[-1].set_xlabel(panel.x)
     for axes in made:
-        axes.set_xlabel(panel.x)
-    made[0].set_ylabel(panel.y)
+        axes.set_ylabel(panel.y)
     return made
 
 
 def _finish(figure: Any, panel: Any, lines: Sequence[str] = (), *, columns: int = 1) -> None:
     """The head of a figure, and one legend below it."""
-    names = ", ".join(one.replace("specimen", "specimen ") for one in panel.specimens)
-    head = [f"Figure {panel.figure}, {names}: {panel.text}"] if panel.figure[0].isdigit() else []
-    figure.suptitle("\n".join([*head, *lines]), fontsize=9, x=0.02, ha="left")
+    numbers = [one.removeprefix("specimen") for one in panel.specimens if "specimen" in one]
+    of = f", specimen{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}" if numbers else ""
+    head = f"Figure {panel.figure}{of}: {panel.text}" if panel.figure[0].isdigit() else panel.text
+    figure.suptitle("\n".join([head, *lines]), fontsize=9, x=0.02, ha="left")
     found = [axes.get_legend_handles_labels() for axes in figure.axes]
     once = {name: line for lines, names in found for line, name in zip(lines, names, strict=True)}
     if once:
@@ -201,7 +199,7 @@ def _density(figure: Any, panel: Any, sources: Sources) -> None:
     for (name, between), one in statistics_of(specimen).items():
         if name in names or (names[0] == POROSITY and "throats with" in name):
             ours = np.mean([measure(section, name, between)[0] for section in sections])
-            span = f" {between[0]:g}–{between[1]:g} {FIELDS[name][0]}" if between else ""
+            span = f" {between[0]:g}–{between[1]:g} {FIELDS[name][0]}".rstrip() if between else ""
             given = f"{one['sense']} {100 * one['value']:g} %".replace("exact ", "")
             lines.append(f"{name}{span}: {100 * ours:.2g} % (thesis {given})")
     axes.set(xlim=edges[[0, -1]])
@@ -231,10 +229,7 @@ def _distance(figure: Any, panel: Any, sources: Sources) -> None:
         axes.bar(edges[part], height[part], 0.1, align="edge", color=colour, label=label)
     lines = [f"{len(values)} fines"]
     for claim in published()["deposition"]:
-        if (
-            claim["throat_porosity"] == [float(one) for one in panel.names]
-            and "nearer" in claim
-        ):
+        if claim["throat_porosity"] == [float(one) for one in panel.names] and "nearer" in claim:
             share = f"{claim['sense']} {100 * claim['value']:g} %"
             lines.append(f"thesis: {share} nearer the {claim['nearer']}")
     _finish(figure, panel, lines)
@@ -242,9 +237,7 @@ def _distance(figure: Any, panel: Any, sources: Sources) -> None:
 
 def _sections(figure: Any, panel: Any, sources: Sources) -> None:
     """k / k0 of sections by the thesis's laws (left) and fdnet's (right), and in the thesis."""
-    for axes, laws in zip(
-        _axes(figure, panel, 2, high=4.2, sharey=True), ("thesis", "own"), strict=True
-    ):
+    for axes, laws in zip(_axes(figure, panel, 2), ("thesis", "own"), strict=True):
         for specimen in panel.specimens:
             runs, style = sources.runs[specimen], _style(sources.runs[specimen])
             slabs = [getattr(run, laws).sections for run in runs]
@@ -292,7 +285,7 @@ def _scan(figure: Any, panel: Any, sources: Sources) -> None:
     """Quantities against what is scanned, one curve a case, with the range over its seeds."""
     (group,) = panel.specimens
     plan = [one for one in points() if one.group == group]
-    for axes, name in zip(_axes(figure, panel, 3, high=3.9), panel.names, strict=True):
+    for axes, name in zip(_axes(figure, panel, 3), panel.names, strict=True):
         for case in dict.fromkeys(one.name for one in plan):
             seeds = {one.seed for one in plan if one.name == case}
             rows = sources.results[sources.results.seed.isin(seeds)]
@@ -309,8 +302,8 @@ def _scan(figure: Any, panel: Any, sources: Sources) -> None:
         axes.set_xscale("log" if group == "drag" else "linear")
         axes.set_ylim(bottom=0)
         unit = QUANTITIES[name].unit
-        axes.set_ylabel(f"{name} ({unit})" if unit else name)
-    _finish(figure, panel, columns=4)
+        axes.set_ylabel(f"{name} ({unit})" if unit else name, fontsize=8)
+    _finish(figure, panel, columns=2)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -357,7 +350,7 @@ def _paint(axes: Any, spheres: Snapshot, *, by_size: bool = False) -> None:
 
 def _spheres(figure: Any, panel: Any, sources: Sources) -> None:
     """The pack, a slab of the invaded pack, or the invaded fines by size."""
-    (axes,) = _axes(figure, panel, high=3.4)
+    (axes,) = _axes(figure, panel)
     run, what = sources.runs[panel.specimens[0]][0], panel.names[0]
     fines, words = run.state.damaged.fines(), f"{run.thesis.invaded_count:,} invaded fines"
     if what == "pack":
@@ -370,7 +363,7 @@ def _spheres(figure: Any, panel: Any, sources: Sources) -> None:
     _finish(figure, panel, [words])
 
 
-KINDS: Mapping[str, Callable[[Any, Any, Sources], None]] = {
+KINDS: Mapping[str, Callable[..., None]] = {
     "depth": _depth,
     "density": _density,
     "distance": _distance,

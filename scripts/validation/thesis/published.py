@@ -3,16 +3,24 @@
 Lengths are in mm, volumes in mm3; everything else is a fraction or a count.
 """
 
+import csv
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 TABLE3 = "table3"
 SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 Between = tuple[float, float] | None
 """(low, high) of a range [low, high); None for a quantity itself."""
+
+
+def rows_in(name: str) -> list[Any]:
+    """The rows of a table next to this module, with a column of texts as an attribute each."""
+    with Path(__file__).with_name(name).open(newline="", encoding="utf-8") as file:
+        return [SimpleNamespace(**row) for row in csv.DictReader(file)]
 
 
 @cache

@@ -234,7 +234,7 @@ FIELDS: Mapping[str, tuple[str, str, Callable[[Section], Array]]] = {
     "volume of the inscribed sphere of a pore": (
         "mm3",
         "pore",
-        lambda s: 4e9 / 3.0 * np.pi * s.network.pore_radius ** 3,
+        lambda s: 4e9 / 3.0 * np.pi * s.network.pore_radius**3,
     ),
     "pore volume with fines": (
         "mm3",

@@ -1,6 +1,5 @@
 """The runs of the thesis's specimens: their plan, how they are made, and the states kept."""
 
-import csv
 import json
 import tomllib
 import zipfile
@@ -21,7 +20,7 @@ from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError
 from fdnet.files import write_bytes, write_text
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
-from validation.thesis.published import TABLE3
+from validation.thesis.published import TABLE3, rows_in
 
 VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", TABLE3)
 
@@ -73,9 +72,12 @@ class Planned:
 
 def points() -> list[Planned]:
     """All rows of plan.csv, one a seed; a scan also has the case itself, at its own value."""
-    with Path(__file__).with_name("plan.csv").open(newline="", encoding="utf-8") as file:
-        rows = [(row.pop("seeds").split(), row) for row in csv.DictReader(file)]
-    return [Planned(seed=int(seed), **row) for seeds, row in rows for seed in seeds]
+    rows = [vars(row) for row in rows_in("plan.csv")]
+    return [
+        Planned(seed=int(seed), **{name: text for name, text in row.items() if name != "seeds"})
+        for row in rows
+        for seed in row["seeds"].split()
+    ]
 
 
 def planned(*, quick: bool = False) -> list[Planned]:
