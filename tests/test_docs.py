@@ -33,8 +33,8 @@ NOW_AND_THEN = {
     *("cpu_seconds", "peak_memory_bytes"),
 }
 """Keys of summary.json that a tiny run does not have."""
-SKETCHES = {"docs/stokes.md", "docs/velocity_field.md"}
-"""Pages whose Python speaks of a reader's own spheres."""
+SLOW = {"docs/evidence/accuracy.md"}
+"""Pages whose Python takes minutes."""
 
 
 def pages() -> Iterator[tuple[str, Path]]:
@@ -153,7 +153,7 @@ def test_python_on_pages_runs(finished, tmp_path, monkeypatch):
     )
     monkeypatch.chdir(tmp_path)
     bad = []
-    for name, path in (page for page in pages() if page[0] not in SKETCHES):
+    for name, path in (page for page in pages() if page[0] not in SLOW):
         text = "".join(fences(path.read_text("utf-8"), "python"))
         try:
             exec(re.sub(r"invade_\d+\.dump", last.name, text), {"__name__": name})
