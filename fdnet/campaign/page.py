@@ -311,7 +311,7 @@ def _draw_keys(comparison: Comparison) -> dict[str, str] | None:
     for key, axes in zip(keys, panels, strict=False):
         other = keys[1 - keys.index(key)] if len(keys) == 2 else ""
         groups = dict.fromkeys(numbers[other].values()) if other else {None: None}
-        for colour, value in zip(COLOURS * len(groups), sorted(groups, key=str), strict=False):
+        for colour, value in zip(COLOURS * len(groups), sorted(groups, key=lambda number: number or 0.0), strict=False):
             names = [n for n in held if not other or numbers[other][n] == value]
             names.sort(key=lambda name: numbers[key][name] or 0.0)
             bands = [comparison.band(name, quantity) for name in names]
