@@ -297,7 +297,7 @@ def _sections(entry: Entry) -> np.ndarray:
 def _draw_keys(comparison: Comparison) -> dict[str, str] | None:
     """A panel for each key that holds numbers; of two, the colour tells the other one's value."""
     held = {name: comparison.keys_of(name) for name in comparison.variants}
-    numbers = {
+    numbers: dict[str, dict[str, Any]] = {
         key: {name: _number_of(keys.get(key)) for name, keys in held.items()}
         for key in comparison.keys
     }
@@ -310,15 +310,13 @@ def _draw_keys(comparison: Comparison) -> dict[str, str] | None:
     figure, panels = _panels(len(keys), 3.4 * min(3, len(keys)) + 0.6, 3.0)
     for key, axes in zip(keys, panels, strict=False):
         other = keys[1 - keys.index(key)] if len(keys) == 2 else ""
-        groups = dict.fromkeys(numbers[other].values()) if other else {None: None}
-        for colour, value in zip(COLOURS * len(groups), sorted(groups, key=str), strict=False):
+        groups = sorted({*numbers[other].values()}) if other else [None]
+        for colour, value in zip(COLOURS * len(groups), groups, strict=False):
             names = [n for n in held if not other or numbers[other][n] == value]
             names.sort(key=lambda name: numbers[key][name] or 0.0)
             bands = [comparison.band(name, quantity) for name in names]
             x = [numbers[key][name] for name in names]
-            low, high = (
-                factor * np.array([getattr(b, e) for b in bands]) for e in ("low", "high")
-            )
+            low, high = factor * np.array([(band.low, band.high) for band in bands]).T
             axes.vlines(x, low, high, color=colour, lw=4, alpha=0.3)
             means = [factor * band.mean for band in bands]
             text = f"{other.rsplit('.', 1)[-1]} {value:g}" if value is not None else None

@@ -63,24 +63,14 @@ def test_the_table_has_every_run_and_number(swept):
     assert int(row["warnings"]) == len(summary["warnings"])
 
 
-def test_the_summary_has_students_bands(swept):
-    """Of two values a and b the half band is t(1) |a - b| / 2, t(1) = 12.706205."""
+def test_the_difference_is_taken_seed_by_seed(swept):
     out, _ = swept
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["runs"], summary["done"], summary["failed"]) == (6, 4, 2)
-    values = [float(r["k_reduction"]) for r in rows(out / "table.csv") if r["variant"] == "many"]
-    many = next(one for one in summary["variants"] if one["name"] == "many")["k_reduction"]
-    assert many["mean"] == pytest.approx(sum(values) / 2)
-    half = 12.706205 * abs(values[0] - values[1]) / 2
-    assert many["high"] - many["mean"] == pytest.approx(half, rel=1e-6)
-    assert set(summary["k_damaged_m2"]) >= {"mean", "low", "high"}
+    losses = {r["run"]: float(r["k_reduction"] or "nan") for r in rows(out / "table.csv")}
+    gaps = [losses[f"few-seed-{seed}"] - losses[f"many-seed-{seed}"] for seed in (1, 2)]
     (pair,) = summary["pairs"]
     assert pair["paired"]
-    gaps = [
-        json.loads((out / f"runs/few-seed-{seed}/summary.json").read_text())["k_reduction"]
-        - json.loads((out / f"runs/many-seed-{seed}/summary.json").read_text())["k_reduction"]
-        for seed in (1, 2)
-    ]
     assert pair["difference"]["mean"] == pytest.approx(sum(gaps) / 2)
 
 
