@@ -2,6 +2,7 @@
 
 import ast
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -82,6 +83,7 @@ DOORS = {
 }
 
 
+@cache
 def modules(root: Path) -> dict[str, ast.Module]:
     package = root / "fdnet"
     return {
@@ -90,6 +92,7 @@ def modules(root: Path) -> dict[str, ast.Module]:
     }
 
 
+@cache
 def imported(tree: ast.Module) -> set[str]:
     """Names imported anywhere in the module, except under `if TYPE_CHECKING`."""
     skipped = {
