@@ -40,19 +40,8 @@ NETWORK_LAYERS = [
     ["permeability"],
     ["warm_up"],
 ]
-CAMPAIGN_LAYERS = [
-    ["plan"],
-    ["engine"],
-    ["result"],
-    ["until"],
-    ["page", "campaign"],
-    ["api"],
-]
-ROOMS = {
-    "fdnet": LAYERS,
-    "fdnet.campaign": CAMPAIGN_LAYERS,
-    "fdnet.network": NETWORK_LAYERS,
-}
+CAMPAIGN_LAYERS = [["plan"], ["engine"], ["result"], ["until"], ["page", "campaign"], ["api"]]
+ROOMS = {"fdnet": LAYERS, "fdnet.campaign": CAMPAIGN_LAYERS, "fdnet.network": NETWORK_LAYERS}
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "campaign/engine", "campaign/page"},
     "subprocess": {
@@ -69,10 +58,7 @@ DOORS = {
     "imageio_ffmpeg": {"report/picture"},
     "openpnm": {"report/tables"},
     "pyarrow": {"campaign/result/table"},
-    "matplotlib": {
-        "campaign/page/figures",
-        "report/figures",
-    },
+    "matplotlib": {"campaign/page/figures", "report/figures"},
     "PIL": {"report/picture"},
     "numba": {"network/compiled"},
     "pymetis": {"network/flow/solver"},
