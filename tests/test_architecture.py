@@ -2,6 +2,7 @@
 
 import ast
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -40,11 +41,7 @@ NETWORK_LAYERS = [
     ["warm_up"],
 ]
 CAMPAIGN_LAYERS = [["plan"], ["engine", "result"], ["page"], ["api"]]
-ROOMS = {
-    "fdnet": LAYERS,
-    "fdnet.campaign": CAMPAIGN_LAYERS,
-    "fdnet.network": NETWORK_LAYERS,
-}
+ROOMS = {"fdnet": LAYERS, "fdnet.campaign": CAMPAIGN_LAYERS, "fdnet.network": NETWORK_LAYERS}
 DOORS = {
     "jinja2": {"dem/deck", "report/html", "campaign/page"},
     "subprocess": {
@@ -59,10 +56,7 @@ DOORS = {
     "vtkmodules": {"report/vtk", "spheres/vtk_file"},
     "imageio_ffmpeg": {"report/picture"},
     "openpnm": {"report/tables"},
-    "matplotlib": {
-        "campaign/page",
-        "report/figures",
-    },
+    "matplotlib": {"campaign/page", "report/figures"},
     "PIL": {"report/picture"},
     "numba": {"network/compiled"},
     "pymetis": {"network/flow/solver"},
@@ -73,6 +67,7 @@ DOORS = {
 }
 
 
+@cache
 def modules(root: Path) -> dict[str, ast.Module]:
     package = root / "fdnet"
     return {
@@ -81,6 +76,7 @@ def modules(root: Path) -> dict[str, ast.Module]:
     }
 
 
+@cache
 def imported(tree: ast.Module) -> set[str]:
     """Names imported anywhere in the module, except under `if TYPE_CHECKING`."""
     skipped = {

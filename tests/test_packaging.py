@@ -13,7 +13,8 @@ SMOKE = """
 import sys, fdnet
 fast = [name for name in ("numpy", "pandas", "scipy") if name in sys.modules]
 case = fdnet.read_case(sys.argv[1])
-run = fdnet.run_case(case, "run", liggghts=sys.argv[2])
+stages = ("pack", "invade", "analyse")
+run = fdnet.run_case(case, "run", liggghts=sys.argv[2], stages=stages)
 spheres = fdnet.read_spheres("run/spheres_damaged.csv", box=[(0, side) for side in case.size_m])
 again = fdnet.analyse(spheres, options=case.analysis)
 print(fdnet.__file__, fast, run.sections.shape[0], again.k_damaged / run.summary["k_damaged_m2"])
@@ -24,38 +25,14 @@ print(fdnet.__file__, fast, run.sections.shape[0], again.k_damaged / run.summary
 def installed(root, tmp_path_factory) -> Path:
     """A folder outside of the project with the wheel installed in it."""
     tmp_path = tmp_path_factory.mktemp("wheel")
-    build = [
-        sys.executable,
-        "-m",
-        "pip",
-        "wheel",
-        "--no-deps",
-        "--quiet",
-        "--disable-pip-version-check",
-        "-w",
-        str(tmp_path),
-        str(root),
-    ]
+    pip = [sys.executable, "-m", "pip"]
+    quiet = ["--no-deps", "--quiet", "--disable-pip-version-check"]
+    build = [*pip, "wheel", *quiet, "-w", str(tmp_path), str(root)]
     built = subprocess.run(build, capture_output=True, text=True, check=False)
     assert built.returncode == 0, built.stderr
-    wheel = next(tmp_path.glob("fdnet-*.whl"))
-    target = tmp_path / "site"
-    subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "pip",
-            "install",
-            "--no-deps",
-            "--quiet",
-            "--disable-pip-version-check",
-            "--target",
-            str(target),
-            str(wheel),
-        ],
-        check=True,
-        capture_output=True,
-    )
+    wheel, target = next(tmp_path.glob("fdnet-*.whl")), tmp_path / "site"
+    install = [*pip, "install", *quiet, "--target", str(target), str(wheel)]
+    subprocess.run(install, check=True, capture_output=True)
     return target
 
 
@@ -69,16 +46,9 @@ def test_a_wheel_installed_elsewhere_renders_a_deck(installed, root, tmp_path):
         "import fdnet, liggghts_templates, sys; from fdnet.cli import main; "
         "print(fdnet.__file__, liggghts_templates.__file__); sys.exit(main())"
     )
+    words = ["render", str(root / "cases" / "quick.toml"), "--out", str(tmp_path / "decks")]
     done = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            code,
-            "render",
-            str(root / "cases" / "quick.toml"),
-            "--out",
-            str(tmp_path / "decks"),
-        ],
+        [sys.executable, "-c", code, *words],
         capture_output=True,
         text=True,
         check=False,

@@ -12,13 +12,7 @@ from pathlib import Path
 import pytest
 from builders import TINY, naming, tiny
 
-from fdnet.case.case import (
-    KEYS,
-    Case,
-    InvasionCase,
-    difference_text,
-    with_fines,
-)
+from fdnet.case.case import KEYS, Case, InvasionCase, difference_text, with_fines
 from fdnet.case.file import case_from, known_keys, read_case, set_keys
 from fdnet.cli import main
 from fdnet.errors import CaseError
@@ -272,21 +266,6 @@ def test_values_in_si_are_those_of_the_keys():
     assert (run.skin_m, run.neighbour_bin_m) == pytest.approx((4e-5, 2e-4))
     assert tiny().run.duration_s is tiny().fines.slab_m is tiny().fluid.darcy_length_m is None
     assert tiny("run.duration_ms=2.0").run.duration_s == pytest.approx(2e-3)
-
-
-def test_a_quick_form_differs_from_its_specimen_only_in_what_it_gives_up(root: Path):
-    for path in (root / "cases/quick").glob("*.toml"):
-        quick, full = read_case(path).data(), read_case(root / "cases" / path.name).data()
-        may = {"name", "box", "run", "fines.count", "grains.count", "analysis.sections"}
-        may |= {"grains.porosity"} if "count" in quick["grains"] else set()
-        for part in set(quick) | set(full):
-            if part in may:
-                continue
-            for key in (
-                set(quick[part]) | set(full[part]) if isinstance(full[part], dict) else {""}
-            ):
-                pair = [data[part].get(key) if key else data[part] for data in (quick, full)]
-                assert f"{part}.{key}" in may or pair[0] == pair[1], f"{path.name}: {part}.{key}"
 
 
 def test_a_box_for_more_grains_than_memory_is_refused():

@@ -17,7 +17,6 @@ from fdnet.dem.clean_up import (
     Start,
     clean_up,
     cleaned_points,
-    fines_inside,
     render_clean_up,
     turned_drag,
 )
@@ -84,12 +83,7 @@ def start(run):
     grains = packed_grains(session)
     damaged = invaded(session, case, grains).damaged
     held.close()
-    return Start(
-        grains=grains,
-        invaded=damaged,
-        invasion=folder / "invade",
-        digest="test",
-    )
+    return Start(grains=grains, invaded=damaged, invasion=folder / "invade", digest="test")
 
 
 def again(start, flow, folder, binary, **options):
@@ -209,13 +203,6 @@ def test_friction_decides_what_stays(start, tmp_path, binary):
         done = again(start, flow, tmp_path / str(friction), binary)
         stayed[friction] = done.history[-1].inside
     assert stayed[0.01] < stayed[5.0]
-
-
-def test_the_fines_inside_take_part_and_the_cake_does_not(start):
-    x = start.invaded.fines().position[:, 0]
-    inside = int(np.sum((x >= 0) & (x < 2e-3)))
-    assert int(np.sum((x < 0) & (x > -1e-4))) > 0
-    assert fines_inside(start.invaded).sum() == inside
 
 
 def test_the_drag_is_that_of_the_drawdown_turned_back():

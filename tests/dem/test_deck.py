@@ -268,21 +268,6 @@ def test_pairs_and_walls_have_the_contact_model_of_the_case(model, law):
     assert has(pack_text(key), rf"^fix wx0 all wall/gran model {law} primitive type 2 xplane")
 
 
-def test_moduli_that_liggghts_would_refuse_are_said_to_be_meant():
-    """It wants to be told of a Young's modulus below 5e6 or above 1e9 Pa."""
-    for stiffness, soft, hard in (
-        ("1.0", True, False),
-        ("1e2", False, False),
-        ("1e6", False, True),
-    ):
-        text = invade_text(
-            "contact.model=hertz", f"run.stiffness_N_m={stiffness}", "fluid.velocity_m_s=1e-3"
-        )
-        assert has(text, "^soft_particles yes") is soft
-        assert has(text, "^hard_particles yes") is hard
-    assert not has(invade_text(), "_particles yes")
-
-
 def test_contact_options_that_are_not_asked_for_are_left_out_and_named():
     words, wall = "rolling|ohesi|limitForce off|cohere", "box.wall_friction=0.3"
     assert not has(invade_text(wall), words)

@@ -33,12 +33,10 @@ from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.run.fluid import Movers, NetworkFluid, fluid_of, history_rows, mean_ahead
 from fdnet.run.network_flow import (
-    MOVED,
     Renewal,
     bed_section,
     changed_share,
     on_each_fine,
-    placed,
     pore_through,
 )
 from fdnet.scales.scales import scales_of
@@ -349,17 +347,6 @@ def test_the_network_is_solved_anew_when_the_deposit_changed(fluid, done):
     assert renewal.solves == 3
 
 
-def test_a_fine_is_measured_within_a_hundredth_of_its_radius(fluid, done):
-    standing = deposit_of(done)
-    near = placed(standing)
-    apart = np.linalg.norm(near.position - standing.position, axis=1) / standing.radius
-    assert 0.0 < np.median(apart) < apart.max() <= MOVED
-    assert np.array_equal(placed(near).position, near.position)
-    tremble = 1e-5 * standing.radius[:, None] * np.array([1.0, -1.0, 1.0])
-    again = placed(replace(standing, position=standing.position + tremble))
-    assert np.mean(np.any(again.position != near.position, axis=1)) < 0.01
-
-
 def test_updates_from_the_former_one_give_what_a_full_one_gives(fluid, done):
     standing = deposit_of(done)
     place = np.array(standing.position)
@@ -372,19 +359,6 @@ def test_updates_from_the_former_one_give_what_a_full_one_gives(fluid, done):
     for name in ("coefficient", "velocity", "push"):
         assert np.array_equal(getattr(grown, name), getattr(full, name))
     assert grown.measures == full.measures
-
-
-def test_what_changed_counts_by_volume():
-    box = np.array([[0.0, 1.0]] * 3)
-    four = fines(np.array([[0.1 * k, 0.5, 0.5] for k in range(4)]), 0.01, box)
-    assert changed_share(four, four) == 0.0
-    three = four.where(np.arange(4) < 3)
-    assert changed_share(four, three) == pytest.approx(0.25)
-    assert changed_share(three, four) == pytest.approx(0.25)
-    shift = replace(four, position=four.position + np.array([[0.011, 0, 0]] + 3 * [[0.0] * 3]))
-    assert changed_share(four, shift) == pytest.approx(0.25)
-    nothing = four.where(np.zeros(4, bool))
-    assert changed_share(nothing, nothing) == 0.0
 
 
 def test_the_ledger_adds_up_and_momentum_closes(fluid, done):
@@ -724,28 +698,6 @@ def test_a_way_that_leads_into_a_grain_ends_before_it():
     near = mean_ahead(movers((0.0, 0.0, 0.0), TRACER), fluid, 100.0)
     assert 1.0 <= near[0, 0] < 2.0
     assert mean_ahead(movers((1.5, 0.0, 0.0), TRACER), fluid, 1.0)[0] == pytest.approx(0.0)
-
-
-def test_a_fine_that_stays_where_the_fluid_is_even_meets_it_there():
-    """Before x = 0 the velocity is 1, from there on 1 + x: only fines that get there are asked."""
-    asked = []
-
-    def fluid(at):
-        asked.append(len(at))
-        return (1.0 + np.maximum(at[:, :1], 0.0)) * np.array([1.0, 0.0, 0.0])
-
-    place = np.array([[-5.0, 0.0, 0.0], [-0.5, 0.0, 0.0], [-2.5, 0.0, 0.0], [0.5, 0.0, 0.0]])
-    four = Movers(
-        position=place,
-        velocity=np.array([[1.0, 0.0, 0.0]] * 2 + [[3.0, 0.0, 0.0], [1.0, 0.0, 0.0]]),
-        rate=np.array([TRACER, TRACER, 1e-9, TRACER]),
-    )
-    everywhere = mean_ahead(four, fluid, 1.0)
-    asked.clear()
-    assert np.array_equal(mean_ahead(four, fluid, 1.0, even_to=0.0), everywhere)
-    assert asked == [4] + [3] * 7
-    assert everywhere[0, 0] == 1.0
-    assert np.all(everywhere[1:, 0] > 1.0)
 
 
 def test_updates_at_every_diameter_carry_fines_as_far_as_eight_times_as_many(grains_of):

@@ -25,10 +25,7 @@ from fdnet.dem.deck import number, render_text, specimen_box
 from fdnet.dem.invade_deck import write_invade_inputs
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
-from fdnet.dem.supply import (
-    batches_of,
-    place_batches,
-)
+from fdnet.dem.supply import batches_of, place_batches
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.run.pipeline import RunOptions, run_stages
 from fdnet.scales.scales import scales_of
@@ -72,10 +69,7 @@ def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(go, tmp_pat
 
 @pytest.mark.parametrize(
     ("scheme", "forces"),
-    [
-        ("implicit", ()),
-        ("held", ("drag.inertia=schiller-naumann", "drag.pressure_gradient=true")),
-    ],
+    [("implicit", ()), ("held", ("drag.inertia=schiller-naumann", "drag.pressure_gradient=true"))],
 )
 def test_a_batched_invasion_accounts_for_every_fine_and_resumes(go, tmp_path, scheme, forces):
     keys = ("fines.supply=batches", "fines.count=900", "run.checkpoint_ms=0.005")
@@ -200,13 +194,6 @@ def test_fines_that_vanish_are_an_error(grains_of, tmp_path):
 
 # ------------------------------------------------------------------------------------------------
 # The overlap of fines: it is measured right, changes no motion, warns or stops.
-
-
-def test_the_watch_never_writes_more_than_some_hundred_rows_a_chunk(grains_of):
-    for case in (tiny(), tiny("run.stiffness_N_m=nominal")):
-        scales = scales_of(case)
-        watch = watch_variables(case, scales, grains_of(tiny()))
-        assert scales.checkpoint_steps / watch["every"] < 210
 
 
 def test_what_was_seen_is_read_line_by_line(tmp_path):

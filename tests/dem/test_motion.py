@@ -104,8 +104,7 @@ def test_implicit_drag_is_bounded_at_any_step(tmp_path, ratio):
 
 
 @pytest.mark.parametrize(
-    ("scheme", "ratio"),
-    [("held", 0.5), ("viscous", 0.5), ("implicit", 0.1), ("implicit", 10)],
+    ("scheme", "ratio"), [("held", 0.5), ("viscous", 0.5), ("implicit", 0.1), ("implicit", 10)]
 )
 def test_a_fine_at_rest_is_pressed_by_the_drag_of_the_fluid(tmp_path, scheme, ratio):
     """Overlap 6 pi mu M r u / k, whatever the step."""

@@ -17,13 +17,7 @@ import pytest
 from builders import followed, tiny
 from cut_and_continue import MATRIX, StopError, cell_case, differences
 
-from fdnet.dem.checkpoint import (
-    UPDATES,
-    Checkpoints,
-    file_digest,
-    read_history,
-    read_updates,
-)
+from fdnet.dem.checkpoint import UPDATES, Checkpoints, file_digest, read_history, read_updates
 from fdnet.dem.invasion import invade, steps_between
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.errors import CaseError, LiggghtsError

@@ -18,7 +18,6 @@ from fdnet.dem.supply import (
     SURE_CROWDING,
     batches_of,
     crowding,
-    last_places,
     later_batch,
     place_batches,
     refuse_crowded_supply,
@@ -114,17 +113,6 @@ def test_a_slab_of_2000_fines_holds_all_that_a_case_may_ask_for(concentration, s
     place = fines.position - [fines.position[:, 0].min(), 0, 0]
     near = cKDTree(place, boxsize=[0.0, 1.6e-3, 1.6e-3]).query(place, 2)[0][:, 1].min()
     assert near >= 2 * CLEARANCE * fines.radius.min() * (1 - 1e-9)
-
-
-def test_where_there_is_no_room_no_place_is_made_up(monkeypatch):
-    """A cubic lattice has holes of 0.73 radii: one sphere goes into each, no larger one does."""
-    monkeypatch.setattr("fdnet.dem.supply.LAST_TRIES", 20_000)
-    edge, size = np.arange(5) * 0.2, np.ones(3)
-    lattice = np.stack(np.meshgrid(edge, edge, edge), axis=-1).reshape(-1, 3)
-    others, span = (lattice, np.full(len(lattice), 0.1)), (np.zeros((3, 3)), np.ones((3, 3)))
-    for radii, count in ((np.array([0.06, 0.05, 0.08]), 2), (np.array([0.08, 0.05, 0.05]), 0)):
-        rng = np.random.default_rng(1)
-        assert len(last_places(radii, span, size, rng=rng, others=others)) == count
 
 
 @pytest.mark.parametrize(("radius", "sides"), [("0.05", "walls"), ("[0.02,0.06]", "periodic")])

@@ -11,13 +11,7 @@ from scipy.integrate import solve_ivp
 
 from fdnet.case.file import read_case
 from fdnet.report.tables import in_millidarcy, millidarcy, percent
-from fdnet.report.text import (
-    answer_sentence,
-    case_words,
-    certainty,
-    end_words,
-    in_place_words,
-)
+from fdnet.report.text import answer_sentence, end_words, in_place_words
 from fdnet.run.answer import (
     FULL,
     QUICK,
@@ -34,7 +28,6 @@ from fdnet.run.answer import (
 )
 from fdnet.run.cake import fit_filtration
 from fdnet.run.summary import above_intact
-from fdnet.scales.scales import scales_of
 
 
 def step(near, far, before, after):
@@ -263,28 +256,6 @@ def test_the_end_is_named_by_the_rule_that_ended_the_run(root):
         with naming(reason, run, rate, said):
             control = read_case(root / "cases/quick.toml").run.model_copy(update=run)
             assert said in end_words({"stop_reason": reason, "rate_over_initial": rate}, control)
-
-
-def test_one_seed_is_said_to_be_one_seed_and_a_cap_not_final():
-    final, seed = certainty(SUMMARY)
-    assert "is final" in final
-    assert all(part in seed for part in ("one seed (3)", "36 %", "6.7 points", "x.csv"))
-    assert "not final" in next(certainty(SUMMARY | {"final": False, "stop_reason": "cap"}))
-    assert "sand has 2,027 mD" in answer_sentence(
-        {"k_initial_m2": 2e-12 * 1.0003, "porosity_initial": 0.38}
-    )
-
-
-def test_the_case_in_words(root):
-    for name, said in [
-        ("quick", ["grains of 0.5 mm (500 µm)", "lost over 8 mm", "508 psi", "between walls"]),
-        ("well", ["a well of 108 mm radius", "a drainage radius of 100 m"]),
-        ("sand-and-mud", ["D50 400", "D90 600", "300 psi", "10 cP"]),
-    ]:
-        with naming(name, said):
-            case = read_case(root / f"cases/{name}.toml")
-            text = " ".join(case_words(case, scales_of(case)))
-            assert all(part in text for part in said), text
 
 
 # ------------------------------------------------------------------------------------------------

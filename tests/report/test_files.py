@@ -160,10 +160,7 @@ def test_summary_takes_numpy_and_names_every_value_json_cannot_hold(tmp_path):
     assert read["warnings"][0] == "doubtful"
     assert [
         ("solver.mass_balance" in w, "sections[0].k_reduction" in w) for w in read["warnings"][1:]
-    ] == [
-        (True, False),
-        (False, True),
-    ]
+    ] == [(True, False), (False, True)]
 
 
 def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path):

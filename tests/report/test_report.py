@@ -224,24 +224,6 @@ def test_the_view_holds_every_sphere_to_the_sixteenth_bit(tmp_path, monkeypatch)
     assert json.loads(text[text.index('{"grains"') : text.index("}", text.index('{"grains"')) + 1])
 
 
-def test_scales_are_rows_of_objects_or_mappings(tmp_path):
-    row = {
-        "name": "Darcy velocity",
-        "symbol": "q",
-        "value": 0.67,
-        "unit": "m/s",
-        "formula": "k dP/(mu L)",
-        "source": "Darcy 1856",
-    }
-    _, text = page_of(
-        tmp_path,
-        SUMMARY,
-        scales=[row, SimpleNamespace(**row | {"name": "other", "value": 2.5e-8})],
-    )
-    assert "Darcy velocity q 0.67 m/s k dP/(mu L) Darcy 1856" in text
-    assert "other q 2.500·10⁻⁸ m/s" in text
-
-
 def test_a_summary_of_an_intact_pack_or_nothing_at_all_still_makes_a_page(tmp_path):
     intact = SUMMARY | {
         "stop_reason": None,
@@ -322,12 +304,7 @@ def test_numbers_as_a_reader_wants_them():
 
 
 HISTORY = [
-    {
-        "physical_time_s": 1e-4 * i,
-        "invaded_count": i,
-        "passed_count": 0,
-        "upstream_count": 50 - i,
-    }
+    {"physical_time_s": 1e-4 * i, "invaded_count": i, "passed_count": 0, "upstream_count": 50 - i}
     for i in range(50)
 ]
 

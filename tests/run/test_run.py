@@ -81,10 +81,7 @@ def test_the_outside_checker_says_that_the_contract_holds(whole, root):
     if not checker.exists():
         pytest.skip(f"the contract checker is not on this machine: {checker}")
     checked = subprocess.run(
-        [sys.executable, str(checker), str(whole[0])],
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, str(checker), str(whole[0])], capture_output=True, text=True, check=False
     )
     assert checked.stdout.strip() == "contract holds", checked.stdout
 

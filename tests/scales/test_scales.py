@@ -370,18 +370,6 @@ def test_the_root_of_the_radial_law_loses_the_pressure_on_the_way():
     assert Losses(viscous=2e8).velocity(5e6, straight(0.2)) == pytest.approx(0.125, rel=1e-15)
 
 
-def test_the_table_of_scales_says_by_which_law(root):
-    formulas = {
-        row.name: row.formula
-        for case in (at_a_well("specimen5", root, "fluid.darcy_law=ergun"),)
-        for row in scale_rows(case, scales_of(case))
-    }
-    assert formulas["Darcy velocity"] == (
-        "mu q r_w ln(r_e/r_w) / k + b q^2 r_w^2 (1/r_w - 1/r_e) = dP"
-    )
-    assert formulas["pressure gradient in the pack"] == "mu q / k + b q^2"
-
-
 # ------------------------------------------------------------------------------------------------
 # Fines driven at a chosen velocity: the same ratios of forces, and the clock of the fluid.
 

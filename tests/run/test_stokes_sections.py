@@ -6,7 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from builders import tiny
+from builders import naming, tiny
 
 import fdnet
 from fdnet.cli import main
@@ -26,8 +26,11 @@ from fdnet.run.stokes_sections import (
 ROUGH, ROUGH_GRAIN = 1.0, 7.0
 """Cells across the radius of a fine and of a grain that keep the tests short."""
 
+
 HEAD = b",".join(one.name.encode() for one in fields(StokesSection)) + b"\n1,1\n"
 """A table whose row has too few numbers."""
+
+
 NOT_FINITE = HEAD.replace(b"\n1,1", b"\n" + b",".join([b"nan"] * len(fields(StokesSection))))
 
 
@@ -35,12 +38,13 @@ def grid(cells: int, k: float) -> StokesFlow:
     return StokesFlow(k=k, iterations=1, residual=0.0, seconds=0.0, cells=cells, unknowns=1)
 
 
-@pytest.mark.parametrize("order", [1.5, 1.75, 2.0])
-def test_the_error_covers_the_orders_of_deposits(order):
-    flows = [grid(n, 1e-12 * (1.0 + 90.0 * n**-order)) for n in (40, 60)]
-    end = estimate(*flows, with_fines=True)
-    assert abs(end.k / 1e-12 - 1.0) <= end.error
-    assert abs(flows[1].k / 1e-12 - 1.0) > end.error
+def test_the_error_covers_the_orders_of_deposits():
+    for order in [1.5, 1.75, 2.0]:
+        with naming(order):
+            flows = [grid(n, 1e-12 * (1.0 + 90.0 * n**-order)) for n in (40, 60)]
+            end = estimate(*flows, with_fines=True)
+            assert abs(end.k / 1e-12 - 1.0) <= end.error
+            assert abs(flows[1].k / 1e-12 - 1.0) > end.error
 
 
 def test_packs_without_fines_are_of_second_order():
@@ -116,39 +120,29 @@ def test_the_command_prints_both_and_the_report_shows_them(resolved, capsys):
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
+def test_what_cannot_be_solved_is_refused_at_once(finished, capsys):
+    for arguments, words in (
         (["--section", "9"], "--section: 9, expected 1 to 3"),
         (["--across", "0.5"], "--across: 0.5, expected 1 to 20"),
         (["--across", "20"], "million cells, expected at most"),
-    ],
-)
-def test_what_cannot_be_solved_is_refused_at_once(finished, arguments, words, capsys):
-    assert main(["stokes", str(finished.path), *arguments]) == 2
-    assert words in capsys.readouterr().err
-    assert not (finished.path / "stokes").exists()
+    ):
+        assert main(["stokes", str(finished.path), *arguments]) == 2
+        assert words in capsys.readouterr().err
+        assert not (finished.path / "stokes").exists()
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize("text", ["{", "[1, 2]", "{}", '[{"state": "initial"}]'])
-def test_kept_grids_that_cannot_be_read_are_named(resolved, tmp_path, text):
-    folder = Path(shutil.copytree(resolved, tmp_path / "run"))
-    (folder / "stokes" / "grids.json").write_text(text)
-    with pytest.raises(CaseError, match=r"grids\.json: cannot be read"):
-        stokes_sections(folder, (1,), across=ROUGH)
-
-
-@pytest.mark.liggghts
-@pytest.mark.parametrize("k", [float("nan"), -1.0, None])
-def test_kept_grids_with_impossible_numbers_are_named(resolved, tmp_path, k):
+def test_kept_grids_that_cannot_be_read_are_named(resolved, tmp_path):
     folder = Path(shutil.copytree(resolved, tmp_path / "run"))
     grids = folder / "stokes" / "grids.json"
     rows = json.loads(grids.read_text())
-    rows[1]["k"] = k
-    grids.write_text(json.dumps(rows))
-    with pytest.raises(CaseError, match=r"grids\.json: cannot be read"):
-        stokes_sections(folder, (1,), across=ROUGH)
+    texts = ["{", "[1, 2]", "{}", '[{"state": "initial"}]']
+    for k in (float("nan"), -1.0, None):
+        texts.append(json.dumps([rows[0], rows[1] | {"k": k}, *rows[2:]]))
+    for text in texts:
+        grids.write_text(text)
+        with naming(text), pytest.raises(CaseError, match=r"grids\.json: cannot be read"):
+            stokes_sections(folder, (1,), across=ROUGH)
 
 
 @pytest.mark.liggghts
@@ -175,11 +169,14 @@ def test_the_table_says_how_fine_the_grids_were(resolved, tmp_path):
     assert row["network_damage_law"] == "all-spheres"
 
 
-@pytest.mark.parametrize("text", [b"", b"a,b\n1,2\n", b"\xff", HEAD, NOT_FINITE])
-def test_a_table_that_cannot_be_read_is_named_and_stops_no_report(tmp_path, text):
-    table = tmp_path / "stokes" / "sections.csv"
-    table.parent.mkdir()
-    table.write_bytes(text)
-    with pytest.raises(CaseError, match=r"sections\.csv: .*call fdnet stokes again"):
-        read_sections(table)
-    assert "call fdnet stokes again" in report_section(tmp_path, tiny(), {})
+def test_a_table_that_cannot_be_read_is_named_and_stops_no_report(tmp_path):
+    for number, text in enumerate([b"", b"a,b\n1,2\n", b"\xff", HEAD, NOT_FINITE]):
+        folder_ = tmp_path / str(number)
+        folder_.mkdir()
+        with naming(text):
+            table = folder_ / "stokes" / "sections.csv"
+            table.parent.mkdir()
+            table.write_bytes(text)
+            with pytest.raises(CaseError, match=r"sections\.csv: .*call fdnet stokes again"):
+                read_sections(table)
+            assert "call fdnet stokes again" in report_section(folder_, tiny(), {})
