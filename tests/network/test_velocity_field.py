@@ -97,7 +97,7 @@ def free_normals(gap):
 
 
 def test_the_velocity_at_a_grain_is_linear_along_it_and_quadratic_across():
-    """A velocity across the wall that is not what that along it asks for makes sinks there."""
+    """What comes in across is what goes out along: else there were sinks at the walls."""
     centre, out = free_normals(0.5)
     assert len(out) > 100
     near = [field("xyz").at(centre + (1.0 + d) * out) for d in (2e-3, 2e-2)]
@@ -106,6 +106,11 @@ def test_the_velocity_at_a_grain_is_linear_along_it_and_quadratic_across():
     assert along[1] == pytest.approx(10.0 * along[0], rel=0.1)
     assert across[1] == pytest.approx(100.0 * across[0], rel=0.1)
     assert across[1] < 0.05 * along[1]
+    place, step = centre + 1.02 * out, 1e-4 * np.eye(3)
+    ahead, behind = ([field("xyz").at(place + way * one) for one in step] for way in (1, -1))
+    gradient = (np.array(ahead) - np.array(behind)).transpose(1, 0, 2) / 2e-4
+    inward = np.abs(np.einsum("ni,nij,nj->n", out, gradient, out)).mean()
+    assert np.abs(np.trace(gradient, axis1=1, axis2=2)).mean() < 0.3 * inward
 
 
 def test_far_upstream_the_mud_moves_evenly():
