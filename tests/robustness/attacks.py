@@ -8,8 +8,7 @@ import resource
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -19,7 +18,6 @@ import pytest
 from robustness.runs import (
     NOTES,
     TABLES,
-    Ended,
     FaultError,
     Prepared,
     check_kept,
@@ -46,7 +44,6 @@ FOREIGN = {
     "figures/figure.png": "mine",
 }
 """Names that fdnet uses too, in a folder of somebody else."""
-WIDE = "size=256m,nr_inodes=100000"
 
 
 def kill(rng: Random, place: Path, prepared: Prepared) -> str:
@@ -125,17 +122,8 @@ def limit(what: int, values: tuple[int, ...], rng: Random, place: Path, prepared
     """A run lacks something the system limits; then the limit is lifted and it is continued."""
     out, most = prepared.copy("unfinished", place), rng.choice(values)
     fresh = what != resource.RLIMIT_FSIZE
-    try:
-        ended = prepared.call(out, "--resume", fresh=fresh, limits={what: most})
-        return judge(prepared, out, ended) if ended.code == 0 else resumed(prepared, out, ended)
-    except FaultError as fault:
-        raise FaultError(f"{fault} (limit {most})") from fault
-
-
-def resumed(prepared: Prepared, out: Path, ended: Ended) -> str:
-    """Judges a command that was refused, and continues the run."""
-    judge(prepared, out, ended)
-    return finish(prepared, out)
+    ended = prepared.call(out, "--resume", fresh=fresh, limits={what: most})
+    return finish(prepared, out) if judge(prepared, out, ended) == "refused" else "ok"
 
 
 def race(rng: Random, place: Path, prepared: Prepared) -> str:
@@ -166,42 +154,31 @@ def foreign(rng: Random, place: Path, prepared: Prepared) -> str:
     return judge(prepared, out, ended)
 
 
-@contextmanager
-def small_disk(place: Path) -> Iterator[Callable[[str], str]]:
-    """A disk at `place`, and a function that sets its limits and returns what forbids it."""
-    place.mkdir()
-
-    def mount(options: str) -> str:
-        words = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(place)]
-        return subprocess.run(words, capture_output=True, text=True, check=False).stderr.strip()
-
-    if refusal := mount(WIDE):
-        pytest.skip(f"no disk can be mounted here: {refusal}")
-    try:
-        yield lambda options: mount(f"remount,{options}")
-    finally:
-        while subprocess.run(["umount", "-l", place], capture_output=True, check=False).returncode:
-            time.sleep(0.1)
-
-
 def full_disk(rng: Random, place: Path, prepared: Prepared) -> str:
     """Bytes or inodes of the disk run out; then there is room and the run is continued."""
-    with small_disk(place / "disk") as resize:
-        out = prepared.copy(rng.choice(("packed", "unfinished")), place / "disk")
-        used = os.statvfs(place / "disk")
-        size = (used.f_blocks - used.f_bfree) * used.f_frsize
-        name, most = rng.choice(
-            (
-                ("nr_inodes", used.f_files - used.f_ffree + rng.choice((0, 1, 2, 4, 8, 16, 32))),
-                ("size", size + (rng.choice((0, 4, 16, 32, 64, 128, 192, 256, 384)) << 10)),
-            )
-        )
-        if refusal := resize(f"{name}={max(1, most)}"):
-            pytest.skip(f"the disk cannot be made smaller: {refusal}")
+    disk, wide = place / "disk", "size=256m,nr_inodes=100000"
+    disk.mkdir()
+
+    def mount(options: str) -> None:
+        words = ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(disk)]
+        if refusal := subprocess.run(words, capture_output=True, text=True, check=False).stderr:
+            pytest.skip(f"no such disk can be mounted here: {refusal}")
+
+    mount(wide)
+    try:
+        out = prepared.copy(rng.choice(("packed", "unfinished")), disk)
+        used = os.statvfs(disk)
+        files, size = used.f_files - used.f_ffree, (used.f_blocks - used.f_bfree) * used.f_frsize
+        more = rng.choice((0, 4, 16, 32, 64, 128, 192, 256, 384)) << 10
+        few = f"nr_inodes={files + rng.choice((0, 1, 2, 4, 8, 16, 32))}", f"size={size + more}"
+        mount(f"remount,{rng.choice(few)}")
         ended = prepared.call(out, *["--resume"] * (out / ".unfinished").exists())
         result = judge(prepared, out, ended)
-        resize(WIDE)
+        mount(f"remount,{wide}")
         return result if result == "ok" else finish(prepared, out)
+    finally:
+        while subprocess.run(["umount", "-l", disk], capture_output=True, check=False).returncode:
+            time.sleep(0.1)
 
 
 ATTACKS: Mapping[str, Attack] = {

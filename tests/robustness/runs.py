@@ -151,7 +151,7 @@ class Prepared(NamedTuple):
         """Start the command that runs the case in `out`."""
         words = ["run", str(self.root / "case.toml"), "--out", str(out), "--quiet", *options]
         words += STAGES * ("--stages" not in words)
-        error = out.parent / f"error-{time.monotonic_ns()}"
+        error = self.root / f"error-{time.monotonic_ns()}"
         return start(words, error, limits or {}, fresh=fresh)
 
     def call(self, out: Path, *options: str, **more: Any) -> Ended:
