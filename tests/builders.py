@@ -65,7 +65,7 @@ def followed(*more, way="fluid.velocity_m_s=5.0"):
 
 
 @contextmanager
-def told(*case: object) -> Iterator[None]:
+def naming(*case: object) -> Iterator[None]:
     """Names the `case` of a loop where it fails."""
     try:
         yield

@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from builders import tiny, told
+from builders import naming, tiny
 
 import fdnet
 from fdnet.campaign.result.words import value_text
@@ -45,7 +45,7 @@ def test_what_is_odd_is_named_and_nothing_else():
         (("run.cap_ms=2.0",), "run.cap_ms"),
         (("fines.radius_mm=0.12", "fines.count=400"), "fines.radius_mm"),
     ]:
-        with told(odd, key):
+        with naming(odd, key):
             assert key not in keys(*SOUND)
             assert key in keys(*SOUND, *odd)
 
@@ -126,7 +126,7 @@ def test_check_refuses_what_run_refuses(tmp_path, capsys):
     ):
         folder_ = tmp_path / str(number)
         folder_.mkdir()
-        with told(assignments, refused):
+        with naming(assignments, refused):
             path, out = folder_ / "case.toml", folder_ / "run"
             path.write_text(tiny(*assignments).toml())
             assert main(["check", str(path)]) == (2 if refused else 0)
@@ -169,7 +169,7 @@ sys.exit(fdnet.cli.main())
 def test_a_stop_inside_a_compiler_is_one_line():
     """llvmlite's call-back loses a KeyboardInterrupt, and numba raises another error for it."""
     for raises in [True, False]:
-        with told(raises):
+        with naming(raises):
             command = [sys.executable, "-c", STOPPED.format(raises=raises)]
             ended = subprocess.run(
                 command, capture_output=True, text=True, timeout=15, check=False
@@ -190,7 +190,7 @@ def test_times_are_said_in_hours_and_minutes():
         (5e5, "139 h"),
         (1e9, "2.8e+05 h (32 years)"),
     ]:
-        with told(seconds, words):
+        with naming(seconds, words):
             assert spoken_time(seconds) == words
 
 

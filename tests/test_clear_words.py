@@ -13,7 +13,7 @@ from builders import tiny
 from fdnet.errors import CaseError, DumpError, LiggghtsError, NetworkError
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Snapshot
-from tests.test_foreign_folders import CUBE, answer
+from tests.run.test_foreign_folders import CUBE, answer
 
 
 @pytest.fixture

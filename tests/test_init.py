@@ -4,7 +4,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from builders import told
+from builders import naming
 
 from fdnet.case.file import first_sentence, read_case
 from fdnet.cli import main
@@ -107,7 +107,7 @@ def test_answers_that_make_no_case_are_refused(tmp_path, capsys):
     ):
         folder_ = tmp_path / str(number)
         folder_.mkdir()
-        with told(changed, message):
+        with naming(changed, message):
             out = folder_ / "case.toml"
             assert init(out, **changed) == 2
             error = capsys.readouterr().err

@@ -1,7 +1,7 @@
 """Progress shows the step, the invaded count and an honest time left; it never runs over."""
 
 import pytest
-from builders import told
+from builders import naming
 
 from fdnet.run.progress import Forecast, Progress
 
@@ -63,7 +63,7 @@ def test_a_line_of_progress_has_no_gap_and_no_long_number(capsys, clock):
         (["FDNET grown 3 30"], "pack: step 0 of ~586812, grown 3 of 30\n"),
         (["FDNET restoring"], ""),
     ]:
-        with told(lines, text):
+        with naming(lines, text):
             with Progress("pack", 586812) as progress:
                 for line in lines:
                     clock.now += 6
@@ -82,7 +82,7 @@ def test_a_count_of_steps_beyond_use_has_three_digits(capsys, clock):
 def test_the_time_left_of_recorded_runs_is_within_a_factor_of_two(clock):
     """Later steps are slower, as more fines are there: the last third decides."""
     for forecast, crossed, chunk in [WELL, SPECIMEN5]:
-        with told(forecast, crossed, chunk):
+        with naming(forecast, crossed, chunk):
             times = [60.0]
             for number in range(1, len(crossed)):
                 times.append(times[-1] + 60.0 + 2.0 * number)

@@ -93,7 +93,7 @@ def draw_frames(
     package = str(Path(__file__).resolve().parents[2])
     before = os.environ.get("PYTHONPATH")
     done = subprocess.run(
-        _command(),
+        drawing_command(),
         input=json.dumps(work),
         capture_output=True,
         text=True,
@@ -113,7 +113,7 @@ def draw_frames(
             raise OSError("the drawing process left no complete PNG")
 
 
-def _command() -> list[str]:
+def drawing_command() -> list[str]:
     """The child, with the software OpenGL that the set-up may have installed."""
     libraries = Path(__file__).resolve().parents[2] / ".prefix" / "bin" / "with-libraries"
     first = [str(libraries)] if os.access(libraries, os.X_OK) else []

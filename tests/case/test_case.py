@@ -10,7 +10,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from builders import TINY, tiny, told
+from builders import TINY, naming, tiny
 
 from fdnet.case.case import (
     KEYS,
@@ -102,7 +102,7 @@ def test_a_bad_value_is_named_with_its_path():
         ("drag", {"scheme": "every_step"}, "'every_step' is no longer there; take 'held'"),
         ("fluid", {"viscosity_Pas": 0.05}, "unknown key"),
     ]:
-        with told(part, values, expected):
+        with naming(part, values, expected):
             assert expected in problems(changed(**{part: values}))
 
 
@@ -371,7 +371,7 @@ def test_bad_input_is_one_clear_error(tmp_path, capsys):
     ):
         folder_ = tmp_path / str(number)
         folder_.mkdir()
-        with told(changed, message):
+        with naming(changed, message):
             path = written(folder_, **changed)
             assert main(["check", str(path)]) == 2
             error = capsys.readouterr().err
@@ -389,7 +389,7 @@ def test_an_unknown_key_is_met_with_the_one_that_is_meant():
         ("grains.frictoin", "did you mean grains.friction?"),
         ("fines.spread", "unknown key (given 1)"),
     ]:
-        with told(key, hint):
+        with naming(key, hint):
             with pytest.raises(CaseError) as caught:
                 case_from(set_keys(tiny().data(), [f"{key}=1"]))
             assert hint in str(caught.value)
@@ -486,7 +486,7 @@ def test_walls_count_where_the_fluid_is_made_with_them():
         ((), set()),
         ((*NETWORK, *PERIODIC), set()),
     ]:
-        with told(keys, stages):
+        with naming(keys, stages):
             assert moved_by(*keys) == {*stages, "analyse"}
 
 
@@ -505,7 +505,7 @@ def test_force_keeps_no_invasion_made_with_other_walls(tmp_path):
     for number, keys in enumerate([NETWORK, (*NETWORK, *LIFTED)]):
         folder_ = tmp_path / str(number)
         folder_.mkdir()
-        with told(keys):
+        with naming(keys):
             case, path = tiny(*keys), folder_ / "run"
             with_stages(case, path, "pack", "invade")
             later = tuple(stage for stage in case.stages if stage not in ("pack", "invade"))

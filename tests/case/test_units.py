@@ -5,7 +5,7 @@ import tomllib
 from decimal import Decimal
 
 import pytest
-from builders import TINY, tiny, told
+from builders import TINY, naming, tiny
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.file import case_from, known_keys, read_case
@@ -35,7 +35,7 @@ def test_units_convert_as_their_definitions_say():
         ("60 N/m", "_N_m", 60.0),
         ("5 %", "_percent", 5.0),
     ]:
-        with told(text, suffix, value):
+        with naming(text, suffix, value):
             assert converted(text, suffix) == pytest.approx(value, rel=2e-9)
 
 
@@ -58,7 +58,7 @@ def test_an_ambiguous_or_wrong_unit_is_refused():
         ("mm", "_mm", "expected a number and a unit of length"),
         ("9" * 70 + " mm", "_mm", "expected a number"),
     ]:
-        with told(text, suffix, message), pytest.raises(ValueError, match=message):
+        with naming(text, suffix, message), pytest.raises(ValueError, match=message):
             converted(text, suffix)
 
 
@@ -153,7 +153,7 @@ def test_ambiguous_units_in_a_case_are_one_problem():
         ("fines", {"D50_um": 40}, "did you mean fines.sizes"),
         ("box", {"size": ["3 mm", 4, "4 mm"]}, "has no unit; write it with its unit"),
     ]:
-        with told(part, values, expected):
+        with naming(part, values, expected):
             data = copy.deepcopy(TINY)
             if "size" in values:
                 del data[part]["size_mm"]
@@ -168,7 +168,7 @@ def test_solids_by_mass_are_the_concentration_by_volume():
         ("25 lb/bbl", 2710.0, 71.32525436 / 2710),
         ("40 kg/m3", 2000.0, 0.02),
     ]:
-        with told(solids, density, fraction):
+        with naming(solids, density, fraction):
             fines = TINY["fines"] | {"solids": solids, "density_kg_m3": density}
             case = case_from(TINY | {"fines": fines})
             assert isinstance(case, InvasionCase)

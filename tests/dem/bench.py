@@ -114,7 +114,8 @@ def kinetic_energy(velocity: Array, mass: float | Array) -> float:
 def released(zeta: float) -> float:
     """Restitution of a damped linear contact that ends at zero force (limitForce on).
 
-    exp(-zeta/s (pi - atan2(2 s zeta, 1 - 2 zeta^2))), s^2 = 1 - zeta^2: Schwager and Poeschel 2007, eq. 20.
+    exp(-zeta/s (pi - atan2(2 s zeta, 1 - 2 zeta^2))), s^2 = 1 - zeta^2 (Schwager and Poeschel
+    2007, eq. 20).
     """
     s = math.sqrt(1 - zeta**2)
     return math.exp(-zeta / s * (math.pi - math.atan2(2 * zeta * s, 1 - 2 * zeta**2)))

@@ -218,9 +218,7 @@ def test_an_undamped_closed_system_gains_no_energy(tmp_path, factor, bound):
     case = tiny(*keys, "run.stiffness_N_m=1e4")
     contact = scales_of(case).contacts["fine-fine"]
     run = {"step": factor * contact.step_limit, "steps": 40_000, "every": 400}
-    frames = bench(
-        case, gas(4, 0.6e-3, 1.0), tmp_path, density=DENSITY, boundary="p p p", **run
-    )
+    frames = bench(case, gas(4, 0.6e-3, 1.0), tmp_path, density=DENSITY, boundary="p p p", **run)
     assert len(frames) == 101
     velocity = np.array([[frame.column(f"v{axis}") for axis in "xyz"] for frame in frames])
     place = np.array([[frame.column(axis) for axis in "xyz"] for frame in frames])

@@ -319,7 +319,7 @@ def test_all_forces_of_a_driven_deck_are_scaled_alike():
     assert len(fast) == 2
 
 
-def test_the_deck_watches_the_overlap_where_it_can_and_says_where_it_cannot():
+def test_the_deck_watches_where_it_can_and_says_where_it_cannot():
     assert "fix overlap all print 50 " in invade_deck().text
     for deck, why in (
         (invade_deck("grains.motion=mobile"), "pairs of grains"),

@@ -1,4 +1,4 @@
-"""Invasions by the real binary: every fine is counted, overlaps are seen, the end is told."""
+"""Invasions by the real binary: every fine is counted, overlaps are seen, the end is said."""
 
 import math
 from dataclasses import replace

@@ -60,7 +60,7 @@ def test_a_continued_invasion_is_the_uncut_one(binary, grains_of, tmp_path, cell
 @pytest.mark.nightly
 @pytest.mark.parametrize("scheme", ["held", "implicit", "viscous"])
 def test_a_continued_invasion_is_the_uncut_one_everywhere(binary, grains_of, tmp_path, scheme):
-    """All cells, on one rank at each place and on two; both models of contacts where it matters."""
+    """All cells, on one rank at each place and on two."""
     for cell, ranks in product([one for one in MATRIX if one[3] == scheme], (1, 2)):
         case, folder = cell_case(*cell), tmp_path / "-".join([*cell, str(ranks)])
         one = {"ranks": ranks, "everywhere": ranks == 1}
@@ -163,8 +163,16 @@ def test_a_restart_cut_by_a_full_disk_is_set_aside(go, cut):
     assert same(go(CASE, folder), whole)
 
 
-def test_a_zeroed_restart_is_passed_over_with_a_warning_that_stays(go, cut):
-    """Also when the continuing session is killed in its turn."""
+def test_a_zeroed_restart_is_passed_over_with_a_warning(go, cut):
+    folder, whole = cut
+    zeros(folder / "post" / f"invade_{whole.history[-1].step}.restart")
+    again = go(CASE, folder, timeout=60.0)
+    assert same(again, whole)
+    (new,) = set(again.warnings) - set(whole.warnings)
+    assert f"went on from the checkpoint at step {whole.history[-2].step}" in new
+
+
+def test_the_warning_stays_when_the_continuing_session_is_killed_too(go, cut):
     folder, whole = cut
     zeros(folder / "post" / f"invade_{whole.history[-1].step}.restart")
 
@@ -217,7 +225,7 @@ def test_a_lost_watch_of_the_overlap_starts_the_invasion_over(go, cut):
     assert any("it was started over" in warning for warning in again.warnings)
 
 
-def test_another_seed_starts_over_and_other_ranks_are_refused(go, done):
+def test_another_number_of_ranks_is_refused(go, done):
     folder, _ = done
     assert points(folder, tiny("run.cap_ms=0.3", "seed=2")).last() is None
     with pytest.raises(CaseError, match=r"begun with --np 1, and --np 2 .* continue with --np 1"):

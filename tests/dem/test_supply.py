@@ -122,9 +122,9 @@ def test_where_there_is_no_room_no_place_is_made_up(monkeypatch):
     edge, size = np.arange(5) * 0.2, np.ones(3)
     lattice = np.stack(np.meshgrid(edge, edge, edge), axis=-1).reshape(-1, 3)
     others, span = (lattice, np.full(len(lattice), 0.1)), (np.zeros((3, 3)), np.ones((3, 3)))
-    for radii, found in ((np.array([0.06, 0.05, 0.08]), 2), (np.array([0.08, 0.05, 0.05]), 0)):
+    for radii, count in ((np.array([0.06, 0.05, 0.08]), 2), (np.array([0.08, 0.05, 0.05]), 0)):
         rng = np.random.default_rng(1)
-        assert len(last_places(radii, span, size, rng=rng, others=others)) == found
+        assert len(last_places(radii, span, size, rng=rng, others=others)) == count
 
 
 @pytest.mark.parametrize(("radius", "sides"), [("0.05", "walls"), ("[0.02,0.06]", "periodic")])

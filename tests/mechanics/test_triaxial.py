@@ -125,3 +125,13 @@ def test_a_pack_without_contacts_is_refused():
     far = resting(column().position, 0.8 * R, column().box)
     with pytest.raises(MechanicsError, match="has no contacts"):
         triaxial(far, SAND, Triaxial(confining=1e6), periodic=ALL)
+
+
+def test_a_pack_that_falls_apart_under_its_stress_is_refused_with_advice():
+    """Walls along x only, no bonds, and overlaps as compressed springs: nothing holds it."""
+    rng = np.random.default_rng(4)
+    box = np.array([[0, 6.6], [0, 4.2], [0, 4.8]]) * R
+    pack = resting(rng.random((26, 3)) * box[:, 1], R, box)
+    test = Triaxial(confining=1.7e6, strain=1e-4, steps=2, rests=20, relieved=False)
+    with pytest.raises(MechanicsError, match=r"falls apart under 1\.7e\+06 Pa.*take a denser pack"):
+        triaxial(pack, replace(SAND, friction=0.1), test, periodic=(False, True, True))

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from builders import told
+from builders import naming
 from scipy.integrate import solve_ivp
 
 from fdnet.case.file import read_case
@@ -60,7 +60,7 @@ def test_rings_in_series_are_the_integral_of_the_pressure():
         ((2e-12, 2e-12, 2e-12), 2e-12),
         ((8e-12, 4e-12, 2e-12), 10e-3 / (1 / 8 + 2 / 4 + 7 / 2) * 1e-9),
     ]:
-        with told(before, formation):
+        with naming(before, formation):
             edges, ratio = np.array([0.0, 1e-3, 3e-3, 10e-3]), (0.05, 0.4, 0.9)
             steps = [
                 step(a, b, k, k * r)
@@ -149,7 +149,7 @@ def test_a_zone_without_damage_without_end_and_without_flow():
         ((0.5, 0.5), 2.0, 0.5, True),
         ((0.0, 1.0), 1.0, 0.0, False),
     ]:
-        with told(after, depth, ratio, open_end):
+        with naming(after, depth, ratio, open_end):
             zone = zone_of([step(0, 1, 1.0, after[0]), step(1, 2, 1.0, after[1])])
             assert (zone.depth, zone.ratio, zone.open_end) == (
                 depth,
@@ -174,7 +174,7 @@ def test_each_rule_turns_at_its_published_limit():
         ({"grain_d15": 301e-6}, ["bridges", "bridges", "bridges", "between"]),
         ({"grain_d15": 541e-6}, ["bridges", "bridges", "bridges", "passes"]),
     ]:
-        with told(changed, says):
+        with naming(changed, says):
             rules = rules_of(sizes(**changed), "bridges")
             assert [rule["says"] for rule in rules] == says
             expected = {"bridges": True, "passes": False, "between": None}
@@ -244,7 +244,7 @@ def test_the_answer_is_a_sentence_to_act_on():
         ({"final": False, "stop_reason": "cap"}, ["not final", "run.cap_ms"], "deeper"),
         ({"invaded_count": 0}, ["No fine entered"], "95 %"),
     ]:
-        with told(changed, said, not_said):
+        with naming(changed, said, not_said):
             text = answer_sentence(SUMMARY | changed)
             assert all(part in text for part in said), text
             assert not_said not in text
@@ -260,7 +260,7 @@ def test_the_end_is_named_by_the_rule_that_ended_the_run(root):
         ("supply_exhausted", {}, None, "supply of fines ran out"),
         ("cap", {}, None, "cap"),
     ]:
-        with told(reason, run, rate, said):
+        with naming(reason, run, rate, said):
             control = read_case(root / "cases/quick.toml").run.model_copy(update=run)
             assert said in end_words({"stop_reason": reason, "rate_over_initial": rate}, control)
 
@@ -281,7 +281,7 @@ def test_the_case_in_words(root):
         ("well", ["a well of 108 mm radius", "a drainage radius of 100 m"]),
         ("sand-and-mud", ["D50 400", "D90 600", "300 psi", "10 cP"]),
     ]:
-        with told(name, said):
+        with naming(name, said):
             case = read_case(root / f"cases/{name}.toml")
             text = " ".join(case_words(case, scales_of(case)))
             assert all(part in text for part in said), text

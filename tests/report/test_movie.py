@@ -1,4 +1,4 @@
-"""Movies: the states in order with their times, and what is refused."""
+"""Movies, and the flow at the states of a run: in order, with their times, and what is refused."""
 
 import json
 import shutil
@@ -6,15 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista as pv
+from builders import naming
 from PIL import Image
 
+from fdnet import solve_flow
+from fdnet.cli import main
 from fdnet.errors import CaseError
 from fdnet.report import picture as pictures
 from fdnet.report.picture import LAST_FRAMES, MovieFrame, Scene, write_movie
 from fdnet.run import movie
-from fdnet.run.movie import movie_of
+from fdnet.run.movie import LINES, colour_limits, flux_of, moments_of, movie_of, streamlines_of
 
 BOX = np.array([[0.0, 4e-3], [0.0, 2e-3], [0.0, 2e-3]])
+
+
 GREYS = (40, 120, 200)
 
 
@@ -61,18 +67,24 @@ def test_a_png_has_the_states_below_each_other_with_the_flow_of_each(tmp_path, m
     assert seen == pytest.approx(GREYS[:2], abs=3)
 
 
-@pytest.mark.parametrize(
-    ("name", "reason", "said"),
-    [("m.avi", "", r"expected .gif, .mp4 or .png"), ("m.gif", "no context", "because no context")],
-)
-def test_what_makes_no_movie_leaves_no_file(tmp_path, monkeypatch, name, reason, said):
-    def fail(*_, **__):
-        raise OSError(reason)
+def test_what_makes_no_movie_leaves_no_file(tmp_path, monkeypatch):
+    for number, (name, reason, said) in enumerate(
+        [
+            ("m.avi", "", r"expected .gif, .mp4 or .png"),
+            ("m.gif", "no context", "because no context"),
+        ]
+    ):
+        folder_ = tmp_path / str(number)
+        folder_.mkdir()
+        with naming(name, reason, said):
 
-    monkeypatch.setattr(pictures, "draw_frames", fail)
-    with pytest.raises(CaseError, match=said):
-        write_movie(tmp_path / name, frames_of(tmp_path), scene_of(tmp_path), per_second=4.0)
-    assert not (tmp_path / name).exists()
+            def fail(*_, reason=reason, **__):
+                raise OSError(reason)
+
+            monkeypatch.setattr(pictures, "draw_frames", fail)
+            with pytest.raises(CaseError, match=said):
+                write_movie(folder_ / name, frames_of(folder_), scene_of(folder_), per_second=4.0)
+            assert not (folder_ / name).exists()
 
 
 def test_an_odd_speed_and_a_folder_without_a_run_are_refused(tmp_path):
@@ -107,14 +119,14 @@ def a_frame(folder):
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize("name", ["m.gif", "m.png", None])
-def test_a_movie_replaces_no_file_unasked(copied, tmp_path, shown, name):
-    there = copied / "invasion.gif" if name is None else tmp_path / name
-    there.write_text("mine")
-    target = None if name is None else there
-    with pytest.raises(CaseError, match=f"{there.name}: is there already; .*--force"):
-        movie_of(copied, target)
-    assert movie_of(copied, target, force=True) == there
+def test_a_movie_replaces_no_file_unasked(copied, tmp_path, shown):
+    for name in ("m.gif", "m.png", None):
+        there = copied / "invasion.gif" if name is None else tmp_path / name
+        there.write_text("mine")
+        target = None if name is None else there
+        with pytest.raises(CaseError, match=f"{there.name}: is there already; .*--force"):
+            movie_of(copied, target)
+        assert movie_of(copied, target, force=True) == there
 
 
 @pytest.mark.liggghts
@@ -131,34 +143,99 @@ def test_a_movie_shows_the_states_of_its_run_alone(copied, tmp_path, shown):
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize("digests", [True, False])
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda path: path.write_bytes(path.read_bytes()[:3000]),
-        lambda path: path.write_bytes(b""),
-        lambda path: path.write_bytes(path.read_bytes()[:-20]),
-        lambda path: (path.unlink(), path.mkdir()),
-    ],
-)
-def test_a_cut_state_is_named_and_not_drawn_empty(copied, tmp_path, shown, spoil, digests):
+def test_a_cut_state_is_named_and_not_drawn_empty(copied, tmp_path, shown):
     """Also in a run whose manifest has no digests of its states."""
-    path = a_frame(copied)
-    spoil(path)
-    if not digests:
-        file = copied / "manifest.json"
-        manifest = json.loads(file.read_text())
-        files = {k: v for k, v in manifest["files"].items() if not k.startswith("frames/")}
-        file.write_text(json.dumps(manifest | {"files": files}))
-    with pytest.raises(CaseError, match=path.name):
-        movie_of(copied, tmp_path / "m.gif")
+    path, file = a_frame(copied), copied / "manifest.json"
+    whole, manifest = path.read_bytes(), json.loads(file.read_text())
+    files = {k: v for k, v in manifest["files"].items() if not k.startswith("frames/")}
+    for kept in (manifest["files"], files):
+        file.write_text(json.dumps(manifest | {"files": kept}))
+        for cut in (whole[:3000], b"", whole[:-20], None):
+            path.unlink()
+            if cut is None:
+                path.mkdir()
+            else:
+                path.write_bytes(cut)
+            with naming(len(kept), cut and len(cut)), pytest.raises(CaseError, match=path.name):
+                movie_of(copied, tmp_path / "m.gif")
+            if cut is None:
+                path.rmdir()
+                path.touch()
     assert not shown
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize("name", ["frames", "spheres_initial.vtp", "history.csv", "profile.csv"])
-def test_a_movie_of_a_changed_run_is_refused(copied, tmp_path, shown, name):
-    path = a_frame(copied) if name == "frames" else copied / name
-    path.write_bytes(path.read_bytes().replace(b"1", b"2", 1))
-    with pytest.raises(CaseError, match=rf"{path.name}: is not the file that the run wrote"):
-        movie_of(copied, tmp_path / "m.gif")
+def test_a_movie_of_a_changed_run_is_refused(copied, tmp_path, shown):
+    for name in ("frames", "spheres_initial.vtp", "history.csv", "profile.csv"):
+        path = a_frame(copied) if name == "frames" else copied / name
+        whole = path.read_bytes()
+        path.write_bytes(whole.replace(b"1", b"2", 1))
+        with pytest.raises(CaseError, match=rf"{path.name}: is not the file that the run wrote"):
+            movie_of(copied, tmp_path / "m.gif")
+        path.write_bytes(whole)
+
+
+# ------------------------------------------------------------------------------------------------
+# The flow at the states of a run.
+
+
+@pytest.mark.liggghts
+def test_fluxes_are_those_of_the_run_before_and_after(finished):
+    """throats.csv holds the fluxes of both states over the same drop of pressure."""
+    flow_of, table = flux_of(finished), finished.throats
+    first = solve_flow(finished.network(), finished.conductance("initial")).inflow
+    for state in ("initial", "damaged"):
+        fines = finished.spheres(state).fines()
+        expected = 100.0 * np.abs(table[f"flux_{state}_m3"]) / first
+        assert flow_of(fines, None).values == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    slower = flow_of(finished.spheres("initial").fines(), 0.5)
+    assert slower.values == pytest.approx(
+        50.0 * np.abs(table["flux_initial_m3"]) / first, rel=1e-6, abs=1e-9
+    )
+    assert slower.k_over_k0 == pytest.approx(1.0)
+
+
+@pytest.mark.liggghts
+def test_streamlines_begin_in_the_mud_and_stay_in_the_box_and_off_the_grains(finished, tmp_path):
+    grains = finished.spheres("initial").grains()
+    flow = streamlines_of(finished, cells=5)(finished.spheres("initial").fines(), 0.25)
+    flow.write(tmp_path / "lines.vtp")
+    lines = pv.read(tmp_path / "lines.vtp")
+    places, box = np.asarray(lines.points), grains.box
+    assert np.all((places[:, 1:] >= box[1:, 0]) & (places[:, 1:] <= box[1:, 1]))
+    assert places[:, 0].min() < box[0, 0] - 0.2 * grains.radius.mean()
+    ends = np.sum(places[:, 0] >= box[0, 1])
+    assert 0.5 * LINES < ends < 1.5 * LINES
+    size = np.ptp(box, axis=1)[1:]
+    apart = places[:, None] - grains.position[None]
+    apart[..., 1:] -= size * np.round(apart[..., 1:] / size)
+    # the field keeps its spheres in single precision
+    assert np.all(np.linalg.norm(apart, axis=2) > (1.0 - 1e-6) * grains.radius[None])
+    speed = np.asarray(lines.point_data["value"])
+    upstream = places[:, 0] < box[0, 0] - 0.4 * grains.radius.mean()
+    assert np.median(speed[upstream]) == pytest.approx(0.25, rel=0.5), "the rate times 1"
+
+
+@pytest.mark.liggghts
+def test_the_command_draws_before_and_after(finished, tmp_path, capsys):
+    target = tmp_path / "flux.png"
+    assert main(["movie", str(finished.path), "--show", "flux", "--out", str(target)]) == 0
+    assert f"picture: {target}" in capsys.readouterr().out
+    with Image.open(target) as picture:
+        upper, lower = np.array_split(np.asarray(picture.convert("RGB"), float), 2)
+    fines = [np.mean(part @ [1.0, 0.0, -1.0] > 150.0) for part in (upper, lower)]
+    assert fines[0] < 1e-4 < 1e-3 < fines[1], "the clean sand holds no orange fine"
+
+
+@pytest.mark.liggghts
+def test_words_say_what_is_known(finished):
+    clean, *_, last = moments_of(finished)
+    assert (clean.rate, last.rate) == (None, None), "a uniform flow has no rate of its own"
+    assert clean.words() == "clean sand"
+    limits = colour_limits(np.array([0.0, 1e-9, 4.1]))
+    assert limits == pytest.approx((0.05, 5.0)), "colours end at the largest values"
+    invaded = finished.summary["invaded_count"]
+    assert last.words(measured=0.5) == (
+        f"{1e3 * finished.summary['physical_time_s']:.3g} ms,   k/k0 0.50,   "
+        f"{invaded} fines in the sand"
+    )

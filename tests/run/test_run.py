@@ -15,7 +15,7 @@ import time
 from pathlib import Path
 
 import pytest
-from builders import tiny, told
+from builders import naming, tiny
 
 from fdnet.cli import main
 from fdnet.errors import CaseError
@@ -189,7 +189,7 @@ def test_damaged_records_are_named_and_force_mends_them(whole, tmp_path):
         if name != "manifest.json":
             cut(folder)
         for content in (b"{}", b"\xff\xfe", b"[]", b"{"):
-            with told(name, content):
+            with naming(name, content):
                 (folder / name).write_bytes(content)
                 refused = fdnet("run", case, "--out", folder, "--resume", *NUMBERS)
                 assert refused.returncode == 2, refused.stderr
@@ -385,6 +385,10 @@ def test_bad_input_writes_nothing_and_ends_with_2(tmp_path):
         assert refused.returncode == 2, arguments
         assert len(refused.stderr.strip().splitlines()) == 1, refused.stderr
         assert not out.exists()
+
+
+def test_a_missing_binary_ends_with_3_before_anything_is_written(tmp_path):
+    case, out = write_case(tmp_path), tmp_path / "run"
     missing = fdnet("run", case, "--out", out, "--liggghts", "/nowhere/liggghts")
     assert missing.returncode == 3
     assert "LIGGGHTS not found" in missing.stderr

@@ -6,7 +6,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from builders import TINY, tiny, told
+from builders import TINY, naming, tiny
 from scipy.integrate import quad
 
 from fdnet.case.file import case_from
@@ -110,7 +110,7 @@ def test_the_stiffness_of_the_case_is_that_of_the_stiffest_contact_of_a_fine():
 def test_the_step_resolves_the_tangent_at_four_percent_and_the_usual_bounds():
     """At the largest factor it is below 0.2 Rayleigh times and 1/10 of a collision."""
     for keys in [(), ("fines.radius_mm=[0.03,0.08]",), ("fines.poissons_ratio=0.5",)]:
-        with told(keys):
+        with naming(keys):
             case = tiny(HERTZ, "run.time_step_factor=0.2", "fluid.velocity_m_s=2.0", *keys)
             scales = scales_of(case)
             low = case.fines.radius_range_m[0]
@@ -169,7 +169,7 @@ def test_a_key_that_the_model_does_not_read_is_one_clear_problem():
         (("contact.rolling_friction=-0.1",), "contact.rolling_friction: -0.1"),
         (("contact.restitution=wet",), "contact.restitution: 'wet'"),
     ):
-        with told(keys), pytest.raises(CaseError, match="1 problem: ") as error:
+        with naming(keys), pytest.raises(CaseError, match="1 problem: ") as error:
             tiny(*keys)
         assert message in str(error.value)
 
@@ -327,7 +327,7 @@ def thrown_back(slope, friction, ratio):
 def test_springs_lock_above_a_shear_ratio_of_friction_times_slope():
     """A second way: the way out of the groove, step by step."""
     for slope in [0.1, 0.32, 0.45]:
-        with told(slope):
+        with naming(slope):
             for friction in (0.5, 0.8):
                 limit = friction * slope
                 assert thrown_back(slope, friction, 1.05 * limit) > 0

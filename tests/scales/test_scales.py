@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from builders import resting_spheres, tiny, told
+from builders import naming, resting_spheres, tiny
 from scipy.integrate import quad
 
 from fdnet.case.case import Case
@@ -40,7 +40,7 @@ def test_specimen_1_has_the_velocities_of_the_thesis(specimen1):
 
 def test_relaxation_times():
     for diameter_mm, microseconds in [(0.05, 5.96), (0.10, 23.8), (0.16, 61.0)]:
-        with told(diameter_mm, microseconds):
+        with naming(diameter_mm, microseconds):
             assert relaxation_time(0.5e-3 * diameter_mm, 2146, 0.05) == pytest.approx(
                 1e-6 * microseconds, rel=2e-3
             )
@@ -69,7 +69,7 @@ FOLLOWED = ("drag.field=network", "drag.upstream=darcy", "fines.supply=slab", "f
 
 def test_stiffness_auto_is_the_least_that_keeps_overlaps_small():
     for model in ["hooke", "hertz"]:
-        with told(model):
+        with naming(model):
             keys = (
                 *FOLLOWED,
                 "drag.scheme=implicit",
@@ -114,7 +114,7 @@ def test_damping_takes_the_mass_of_what_moves():
     The rate is 2 zeta sqrt(k / m), with 1/m = 1/m_fine + 1/m_grain if the grain moves.
     """
     for motion, heavy in [("fixed", 0.0), ("mobile", 1.0)]:
-        with told(motion, heavy):
+        with naming(motion, heavy):
             contact = scales_of(
                 tiny("fines.radius_mm=0.2", "fines.count=60", f"grains.motion={motion}")
             ).contacts["grain-fine"]
@@ -180,7 +180,7 @@ def test_extreme_numbers_are_refused_not_crashed_on():
         "fluid.viscosity_cP=1e15",
         "run.time_step_s=1e-18",
     ]:
-        with told(assignment), pytest.raises(CaseError):
+        with naming(assignment), pytest.raises(CaseError):
             scales_of(tiny(assignment))
 
 
@@ -200,7 +200,7 @@ def test_a_duration_is_met_by_whole_chunks():
     for duration_ms, stiffness in itertools.product(
         [0.08, 0.2, 2.0], [1e2, 3e2, 1e3, 3e3, 1e4, 1e5, 1e6]
     ):
-        with told(duration_ms, stiffness):
+        with naming(duration_ms, stiffness):
             case = tiny(
                 f"run.duration_ms={duration_ms!r}",
                 f"run.stiffness_N_m={stiffness!r}",
@@ -215,7 +215,7 @@ def test_a_duration_is_met_by_whole_chunks():
 def test_a_cap_is_reached_by_whole_chunks():
     """The least number of chunks of 0.09 ms that does not end before the cap, also for 0.12 ms."""
     for cap_ms, expected in [(0.05, 1), (0.09, 1), (0.12, 2), (0.18, 2), (0.2, 3)]:
-        with told(cap_ms, expected):
+        with naming(cap_ms, expected):
             case = tiny(f"run.cap_ms={cap_ms}", "run.checkpoint_ms=0.09", "fluid.velocity_m_s=5.0")
             scales = scales_of(case)
             chunk = scales.checkpoint_steps * scales.time_step
@@ -274,7 +274,7 @@ def at_a_well(name: str, root, *assignments: str) -> Case:
 
 def test_a_well_of_the_field_moves_the_fluid_at_centimetres_per_second(root):
     for name, speed in [("specimen1", 0.024), ("specimen5", 0.059)]:
-        with told(name, speed):
+        with naming(name, speed):
             plug, well = (
                 scales_of(read_case(root / f"cases/{name}.toml")),
                 scales_of(at_a_well(name, root)),
@@ -306,7 +306,7 @@ def test_a_well_and_another_velocity_are_one_error():
         (("fluid.velocity_m_s=1.0",), "velocity_m_s = 1:"),
         (("fluid.darcy_length_mm=8.0",), "darcy_length_mm = 8:"),
     ]:
-        with told(more, named):
+        with naming(more, named):
             with pytest.raises(CaseError, match="1 problem: well: the table") as caught:
                 tiny(WELL, *more)
             assert named in str(caught.value)
@@ -334,7 +334,7 @@ def test_a_case_that_names_no_way_is_told_what_a_well_would_give():
 def test_inertia_takes_a_tenth_to_a_quarter_at_the_gradients_of_the_thesis(root):
     """Ergun's ratio of the losses, (1.75 / 150) rho q d / (mu (1 - phi)), with the pack's k."""
     for name, percent in [("specimen1", 10), ("specimen5", 26)]:
-        with told(name, percent):
+        with naming(name, percent):
             path = root / f"cases/{name}.toml"
             darcy, ergun = (
                 scales_of(read_case(path)),
@@ -434,7 +434,7 @@ def test_auto_drives_to_a_tenth_or_as_fast_as_the_fluid():
 def test_the_times_of_a_case_are_those_of_the_fluid():
     """Three times as fast, in a third of the time."""
     for key in ["duration", "plug_time", "cap", "checkpoint"]:
-        with told(key):
+        with naming(key):
             speed = driven().interstitial_velocity
             keys = {"checkpoint": 2.0, "plug_time": 40.0} | {
                 key: 60.0 if key != "checkpoint" else 4.0

@@ -4,7 +4,7 @@ import math
 import re
 
 import pytest
-from builders import tiny, told
+from builders import naming, tiny
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from
@@ -44,7 +44,7 @@ def explicit(step: float, scheme: str) -> Case:
 
 def test_the_contact_bound_holds_for_every_scheme():
     for scheme in ["held", "implicit", "viscous"]:
-        with told(scheme):
+        with naming(scheme):
             for factor in (0.9999, 1.0):
                 case = tiny(f"run.time_step_s={0.3 * factor * bound()!r}", f"drag.scheme={scheme}")
                 assert scales_of(case).time_step == 0.3 * factor * bound()
@@ -62,7 +62,7 @@ def test_a_long_step_is_accepted_as_far_as_the_contacts_leave_it_stable():
         (["contact.rolling_friction=0.1"], 0.2),
         (["contact.model=hertz"], 0.2),
     ]:
-        with told(keys, largest):
+        with naming(keys, largest):
             largest = math.floor(1e3 * largest) / 1e3
             scales_of(tiny(*keys, f"run.time_step_factor={largest}"))
             if largest < 0.3:
@@ -74,7 +74,7 @@ def test_a_long_step_is_accepted_as_far_as_the_contacts_leave_it_stable():
 
 def test_explicit_drag_warns_above_a_tenth_of_tau_and_is_refused_above_tau():
     for scheme in ["held", "viscous"]:
-        with told(scheme):
+        with naming(scheme):
             short = tau(1e3)
             for part in (0.0999, 0.1):
                 assert "drag is held" not in warnings_of(explicit(part * short, scheme))
@@ -111,7 +111,7 @@ def test_a_given_refresh_warns_above_a_tenth_of_tau_and_is_refused_above_tau():
 
 def test_a_derived_step_keeps_both_bounds_without_a_warning():
     for factor in [0.01, 0.1, 0.2]:
-        with told(factor):
+        with naming(factor):
 
             def derived(*assignments: str, factor: float = factor) -> InvasionScales:
                 keys = (f"run.time_step_factor={factor}", "run.checkpoint_ms=0.1")
@@ -178,7 +178,7 @@ def test_steps_and_so_hours_go_with_the_root_of_the_stiffness():
     assert steps == pytest.approx(2e-3 / scales_of(given).time_step, abs=1)
 
 
-def test_the_limit_is_the_expected_hours_of_the_stages_to_run():
+def test_the_limit_is_the_expected_hours():
     for factor, refused in ((0.999, True), (1.001, False)):
         limited = tiny(f"run.max_hours={factor * hours(tiny())}")
         assert bool(over_limit(limited, scales_of(limited))) == refused
@@ -202,7 +202,7 @@ def test_the_refusal_names_what_makes_the_run_long():
         ),
         (["fines.count=1", "run.duration_ms=1e-4"], "most of it packing 66 grains"),
     ]:
-        with told(assignments, message):
+        with naming(assignments, message):
             case = tiny("run.max_hours=1e-6", "run.checkpoint_ms=0.001", *assignments)
             assert re.search(message, over_limit(case, scales_of(case)))
 

@@ -1,6 +1,7 @@
-"""report.html: self-contained, escaped, and it says what the summary says."""
+"""The report: figures for every kind of specimen, and a page that says what the summary says."""
 
 import base64
+import copy
 import json
 import re
 from html.parser import HTMLParser
@@ -8,14 +9,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from report_demo import demo_damaged
+from builders import naming
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+from report_demo import demo_analysis, demo_damaged, demo_grains, snapshot_of
 
 from fdnet.errors import CaseError
+from fdnet.report import figures
 from fdnet.report import vtk as view
+from fdnet.report.figures import PlacedSizes, cut_circles, fill_size_curves
 from fdnet.report.html import ReportParts, quantity, write_report
 from fdnet.report.text import facts, html_lines, summary_lines
 from fdnet.report.vtk import view_of
 from fdnet.run.answer import BridgingSizes, rules_of
+from fdnet.sizes import LogNormal, cut_curve
+from fdnet.spheres.snapshot import Kind
 
 SIZES = BridgingSizes(
     fines={"D50": 40e-6, "D85": 60e-6, "D90": 100e-6},
@@ -24,7 +32,11 @@ SIZES = BridgingSizes(
     grain_d15=270e-6,
     concentration=0.05,
 )
+
+
 PNG = b"\x89PNG\r\n\x1a\n" + b"anything"
+
+
 SECTION = {
     "section": 1,
     "x_lo_m": 0.0,
@@ -39,6 +51,8 @@ SECTION = {
     "fines_count": 704,
     "fines_fraction": 0.7,
 }
+
+
 SUMMARY = {
     "case": "specimen <1>",
     "seed": 4,
@@ -190,7 +204,7 @@ def test_the_page_answers_first_and_checks_the_run_before_the_rest(tmp_path):
     assert "costs 0.8 % of the flow of a well of 108 mm radius" in text
 
 
-def test_the_view_holds_every_sphere_to_the_sixteenth_bit(tmp_path):
+def test_the_view_holds_every_sphere_to_the_sixteenth_bit(tmp_path, monkeypatch):
     spheres = demo_damaged()
     model = view_of(spheres)
     table = np.frombuffer(base64.b64decode(model["data"]), "<u2").reshape(-1, 4) / 65535
@@ -205,12 +219,9 @@ def test_the_view_holds_every_sphere_to_the_sixteenth_bit(tmp_path):
     scripts = [attributes for tag, attributes in reader.tags if tag == "script"]
     assert len(scripts) == 2
     assert not any("src" in attributes for attributes in scripts)
-    assert json.loads(text[text.index('{"grains"') : text.index("}", text.index('{"grains"')) + 1])
-
-
-def test_a_view_of_too_many_spheres_is_left_to_the_picture(monkeypatch):
     monkeypatch.setattr(view, "MOST_IN_VIEW", len(demo_damaged()) - 1)
-    assert view_of(demo_damaged()) is None
+    assert view_of(demo_damaged()) is None, "too many are left to the picture"
+    assert json.loads(text[text.index('{"grains"') : text.index("}", text.index('{"grains"')) + 1])
 
 
 def test_scales_are_rows_of_objects_or_mappings(tmp_path):
@@ -245,6 +256,8 @@ def test_a_summary_of_an_intact_pack_or_nothing_at_all_still_makes_a_page(tmp_pa
     assert "No warnings" in text
     _, text = page_of(tmp_path, {})
     assert "fdnet run" in text
+    first = next(facts(SUMMARY | {"stop_reason": None}))
+    assert "77,510 -> 51,680 mD" in first.text
 
 
 def test_text_page_and_notebook_say_the_same_numbers_and_words(tmp_path):
@@ -281,11 +294,6 @@ def test_text_page_and_notebook_say_the_same_numbers_and_words(tmp_path):
     assert not re.search(r"-0\.0\b", page + words + book)
 
 
-def test_a_run_with_invaders_but_no_stop_reason_shows_the_damage():
-    first = next(facts(SUMMARY | {"stop_reason": None}))
-    assert "77,510 -> 51,680 mD" in first.text
-
-
 def test_a_missing_figure_is_named(tmp_path):
     with pytest.raises(CaseError, match=r"none\.png"):
         write_report(
@@ -294,9 +302,8 @@ def test_a_missing_figure_is_named(tmp_path):
     assert not (tmp_path / "r.html").exists()
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
+def test_numbers_as_a_reader_wants_them():
+    for value, text in [
         (None, "–"),
         (float("nan"), "–"),
         (float("inf"), "∞"),
@@ -309,7 +316,85 @@ def test_a_missing_figure_is_named(tmp_path):
         (12345.6, "12\u2009346"),
         (True, "True"),
         ("direct", "direct"),
-    ],
-)
-def test_numbers_as_a_reader_wants_them(value, text):
-    assert quantity(value) == text
+    ]:
+        with naming(value, text):
+            assert quantity(value) == text
+
+
+HISTORY = [
+    {
+        "physical_time_s": 1e-4 * i,
+        "invaded_count": i,
+        "passed_count": 0,
+        "upstream_count": 50 - i,
+    }
+    for i in range(50)
+]
+
+
+DAMAGE = {"porosity_reduction", "invaded_fraction", "permeability_ratio"}
+
+
+def coloured_share(path):
+    picture = imread(path)[..., :3]
+    return float((picture.min(axis=2) < 0.95).mean())
+
+
+def curves() -> PlacedSizes:
+    curve = cut_curve(LogNormal(40e-6, 0.5), cut=(0.02, 0.95))
+    return PlacedSizes(
+        name="fines",
+        law="log-normal",
+        asked={0.5: 40e-6},
+        curve=curve,
+        placed=curve.strata(500),
+        invaded=curve.strata(20),
+    )
+
+
+def test_all_figures_of_a_damaged_specimen(tmp_path):
+    """With a section of no flow, fines of one size, and the whole page around them."""
+    dead = [copy.copy(s) for s in demo_analysis().sections]
+    dead[0].k_initial = dead[0].k_initial_inplace = 0.0
+    analysis = SimpleNamespace(**(vars(demo_analysis()) | {"sections": tuple(dead)}))
+    paths = figures.draw_all(
+        tmp_path / "figures", analysis, demo_damaged(), HISTORY, sizes=[curves()]
+    )
+    assert {path.stem for path in paths} == set(figures.CAPTIONS) - {"spheres_3d"}
+    assert sorted(paths) == sorted((tmp_path / "figures").iterdir())
+    assert all(imread(path).shape[1] >= 900 and coloured_share(path) > 0.02 for path in paths)
+    captioned = [(path, figures.CAPTIONS[path.stem]) for path in paths]
+    page = write_report(tmp_path / "report.html", SUMMARY, parts=ReportParts(figures=captioned))
+    assert page.read_text(encoding="utf-8").count("data:image/png") == len(paths)
+
+
+def test_a_pack_without_fines_inside_gets_no_figures_of_damage(tmp_path):
+    none = {"occupancy": None, "invaded_count": 0, "layers": None}
+    intact = SimpleNamespace(**(vars(demo_analysis()) | none))
+    stems = {path.stem for path in figures.draw_all(tmp_path, intact, demo_grains())}
+    assert stems == {"side_view", "depth", "network", "size_distributions"}
+    fines = snapshot_of([[-1e-4, 1e-3, 1e-3]], 5e-5, Kind.FINE, first_id=900)
+    nothing = {"k_initial": 0.0, "invaded_count": 0}
+    analysis = SimpleNamespace(**(vars(demo_analysis()) | nothing))
+    paths = figures.draw_all(tmp_path / "cake", analysis, demo_grains().joined(fines))
+    assert {path.stem for path in paths} >= DAMAGE
+
+
+def test_cut_circles_are_pythagoras():
+    position = np.array([[1.0, 0.0, 2.0], [3.0, 3.0, 4.0], [5.0, 5.0, 6.0], [7.0, -5.1, 8.0]])
+    index, centre, radius = cut_circles(snapshot_of(position, 5.0, Kind.GRAIN), 0.0)
+    assert index.tolist() == [0, 1]  # touching (d = r) is no cut
+    assert centre.tolist() == [[1, 2], [3, 4]]
+    assert radius == pytest.approx([5.0, 4.0])  # the 3-4-5 triangle
+
+
+def test_the_curves_of_sizes_are_drawn_over_the_diameter_in_microns():
+    """The steps of the placed spheres end at the shares that the cuts leave."""
+    figure = Figure()
+    fill_size_curves(figure, sizes=[curves()])
+    asked, given, placed, invaded = figure.axes[0].get_lines()
+    assert given.get_xydata()[0] == pytest.approx([40.0, 50.0])
+    assert asked.get_ydata()[[0, -1]] == pytest.approx([2.0, 95.0])
+    assert placed.get_ydata()[-1] == pytest.approx(95.0)
+    assert np.interp(40.0, placed.get_xdata(), placed.get_ydata()) == pytest.approx(50.0, abs=0.5)
+    assert len(invaded.get_xdata()) == 20

@@ -6,13 +6,20 @@ import shutil
 from pathlib import Path
 
 import pytest
-from builders import tiny
+from builders import naming, tiny
 
+import fdnet
 from fdnet.cli import main
+from fdnet.errors import CaseError
+from fdnet.files import write_text
+from fdnet.run import pipeline
+from fdnet.run.records import RunOptions
 
 CUBE = "x_m,y_m,z_m,radius_m\n" + "".join(
     f"{x + 0.5},{y + 0.5},{z + 0.5},0.5\n" for x in range(3) for y in range(3) for z in range(3)
 )
+
+
 LAWS = "law,damage_law,k_initial_m2\nlubrication,section-archie,1e-12\n"
 
 
@@ -51,34 +58,39 @@ def case(tmp_path: Path) -> Path:
 
 
 @pytest.mark.liggghts
-@pytest.mark.parametrize("extra", [[], ["--force"], ["--resume"]])
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        (".lock", ""),
-        (".lock", "pid 77\n"),
-        ("manifest.json", '{"name": "web app", "icons": []}'),
-        ("manifest.json", '{"format": 1, "name": "another program"}'),
-        ("manifest.json", "not JSON"),
-        ("pack/stage.json", '{"stage": "theatre"}'),
-        ("pack/stage.json", '{"format": 1}'),
-        (".unfinished", "symphony\n"),
-        (".fdnet-run", "\n"),
-    ],
-)
-def test_a_folder_of_somebody_else_is_refused_whole(tmp_path, case, capsys, name, text, extra):
-    out = foreign(tmp_path / "theirs", name, text)
-    before = content(out)
-    code, err = answer(capsys, "run", case, "--out", out, "--quiet", *extra)
-    assert code == 2
-    assert "holds no fdnet run" in err
-    assert "--force" not in err
-    assert content(out) == before
+def test_a_folder_of_somebody_else_is_refused_whole(tmp_path, case, capsys):
+    """Also one with an empty lock, a manifest or a case of another program; --force or not."""
+    for number, (name, text) in enumerate(
+        [
+            (".lock", ""),
+            (".lock", "pid 77\n"),
+            ("manifest.json", '{"name": "web app", "icons": []}'),
+            ("manifest.json", '{"format": 1, "name": "another program"}'),
+            ("manifest.json", "not JSON"),
+            ("pack/stage.json", '{"stage": "theatre"}'),
+            ("pack/stage.json", '{"format": 1}'),
+            (".unfinished", "symphony\n"),
+            (".fdnet-run", "\n"),
+            ("case.toml", case.read_text()),
+        ]
+    ):
+        out = foreign(tmp_path / f"theirs {number}", name, text)
+        before = content(out)
+        for extra in ([], ["--force"], ["--resume"]):
+            with naming(name, text, extra):
+                code, err = answer(capsys, "run", case, "--out", out, "--quiet", *extra)
+                assert code == 2
+                assert "holds no fdnet run" in err
+                assert "--force" not in err
+                assert content(out) == before
 
 
 @pytest.mark.liggghts
 def test_a_folder_of_ours_is_known_by_its_mark_or_its_content(tmp_path, case, capsys):
+    """An empty one with the empty lock of a session killed at once is taken, too."""
     out = tmp_path / "run"
+    out.mkdir()
+    (out / ".lock").touch()
     pack = ["run", case, "--out", out, "--quiet", "--stages", "pack"]
     assert answer(capsys, *pack)[0] == 0
     assert (out / ".fdnet-run").read_text().startswith("fdnet run folder")
@@ -87,65 +99,58 @@ def test_a_folder_of_ours_is_known_by_its_mark_or_its_content(tmp_path, case, ca
 
 
 @pytest.mark.liggghts
-def test_a_folder_with_the_empty_lock_of_a_session_killed_at_once_is_empty(tmp_path, case, capsys):
+def test_half_written_files_of_a_killed_session_are_removed_at_the_next_start(
+    tmp_path, case, capsys
+):
     out = tmp_path / "run"
-    out.mkdir()
-    (out / ".lock").touch()
-    assert answer(capsys, "run", case, "--out", out, "--quiet", "--stages", "pack")[0] == 0
+    pack = ["run", case, "--out", out, "--quiet", "--stages", "pack"]
+    assert answer(capsys, *pack)[0] == 0
+    (out / "figures").mkdir()
+    for name in (".sections.999.part.csv", "figures/.sections.12.part.png", "pack/.x.7.part"):
+        (out / name).write_text("half")
+    (out / "my.part.csv").write_text("mine")
+    assert answer(capsys, *pack)[0] == 0
+    left = sorted(p.name for p in out.rglob("*.part*"))
+    assert left == ["my.part.csv"], "half-written files of a killed session are removed"
 
 
 @pytest.mark.liggghts
-def test_a_refused_run_leaves_what_another_put_into_its_new_folder(tmp_path, case, monkeypatch):
-    from fdnet.errors import CaseError
-    from fdnet.run import pipeline
-    from fdnet.run.records import RunOptions
-
+def test_a_refused_run_leaves_what_another_put_into_its_new_folder(tmp_path, monkeypatch):
     def refuse(session):
         (session.path / "notes.txt").write_text("mine")
         raise CaseError("refused")
 
-    monkeypatch.setattr(pipeline, "_carry_out", refuse)
-    with pytest.raises(CaseError):
+    monkeypatch.setattr(pipeline, "pack_stage", refuse)
+    with pytest.raises(CaseError, match="refused"):
         pipeline.run_stages(tiny(), RunOptions(out=tmp_path / "run", show_progress=False))
     assert [p.name for p in (tmp_path / "run").iterdir()] == ["notes.txt"]
 
 
-@pytest.mark.parametrize("name", ["pack/pack.data", "pack/in.pack", "invade/in.invade"])
-def test_decks_are_never_written_over_a_file(tmp_path, case, capsys, name):
-    out = tmp_path / "theirs"
-    (out / name).parent.mkdir(parents=True)
-    (out / name).write_text("mine")
-    code, err = answer(capsys, "render", case, "--out", out)
-    assert code == 2
-    assert "is there already" in err
-    assert content(out) == {str(out / name): b"mine"}
+def test_decks_are_never_written_over_a_file(tmp_path, case, capsys):
+    for name in ("pack/pack.data", "pack/in.pack", "invade/in.invade", ".fdnet-run"):
+        out = tmp_path / name.replace("/", " ")
+        (out / name).parent.mkdir(parents=True)
+        (out / name).write_text("fdnet run folder, format 1\n")
+        before = content(out)
+        code, err = answer(capsys, "render", case, "--out", out)
+        assert code == 2
+        assert ("run folder" if name == ".fdnet-run" else "is there already") in err
+        assert content(out) == before, name
 
 
-def test_decks_are_not_written_into_a_run_folder(tmp_path, case, capsys):
-    out = tmp_path / "run"
-    out.mkdir()
-    (out / ".fdnet-run").write_text("fdnet run folder, format 1\n")
-    code, err = answer(capsys, "render", case, "--out", out)
-    assert code == 2
-    assert "run folder" in err
-
-
-@pytest.mark.parametrize("how", ["itself", "link", "hard link", "dots"])
-def test_the_table_of_laws_never_replaces_its_input(tmp_path, capsys, how):
-    spheres, table = tmp_path / "s.csv", tmp_path / "t.csv"
+def test_the_table_of_laws_never_replaces_its_input(tmp_path, capsys):
+    spheres, other = tmp_path / "s.csv", tmp_path / "t.csv"
     spheres.write_text(CUBE)
-    if how == "itself":
-        table = spheres
-    elif how == "link":
-        table.symlink_to(spheres)
-    elif how == "hard link":
-        os.link(spheres, table)
-    else:
-        table = tmp_path / "." / ".." / tmp_path.name / "s.csv"
-    code, err = answer(capsys, "permeability", spheres, "--csv", table)
-    assert code == 2
-    assert "is the file of spheres itself" in err
-    assert spheres.read_text() == CUBE
+    dots = tmp_path / "." / ".." / tmp_path.name / "s.csv"
+    for how in (None, other.symlink_to, other.hardlink_to, dots):
+        if callable(how):
+            how(spheres)
+        table = other if callable(how) else how or spheres
+        code, err = answer(capsys, "permeability", spheres, "--csv", table)
+        assert code == 2
+        assert "is the file of spheres itself" in err, how
+        assert spheres.read_text() == CUBE
+        other.unlink(missing_ok=True)
 
 
 def test_the_table_of_laws_replaces_a_table_of_laws_alone(tmp_path, capsys):
@@ -164,15 +169,9 @@ def test_the_table_of_laws_replaces_a_table_of_laws_alone(tmp_path, capsys):
             assert (tmp_path / name).read_text() == text
         else:
             assert (tmp_path / name).read_text().startswith("law,damage_law,")
-
-
-def test_the_table_of_laws_is_written_through_a_link(tmp_path, capsys):
-    (tmp_path / "s.csv").write_text(CUBE)
     (tmp_path / "link.csv").symlink_to("kept.csv")
-    assert (
-        answer(capsys, "permeability", tmp_path / "s.csv", "--csv", tmp_path / "link.csv")[0] == 0
-    )
-    assert (tmp_path / "link.csv").is_symlink()
+    assert answer(capsys, "permeability", spheres, "--csv", tmp_path / "link.csv")[0] == 0
+    assert (tmp_path / "link.csv").is_symlink(), "it is written through a link"
     assert (tmp_path / "kept.csv").read_text().startswith("law,")
 
 
@@ -185,36 +184,10 @@ def test_the_table_of_laws_never_replaces_a_device_a_pipe_or_a_folder(tmp_path, 
         code, err = answer(capsys, "permeability", tmp_path / "s.csv", "--csv", tmp_path / name)
         assert code == 2
         assert "is no ordinary file" in err
-    assert (tmp_path / "pipe").is_fifo()
-
-
-def test_no_file_is_replaced_where_a_device_or_a_folder_stands(tmp_path):
-    from fdnet.errors import CaseError
-    from fdnet.files import write_text
-
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "folder").mkdir()
     for name in ("pipe", "folder"):
         with pytest.raises(CaseError, match="is no ordinary file"):
             write_text(tmp_path / name, "x")
-    assert len(list(tmp_path.iterdir())) == 2
-
-
-@pytest.mark.liggghts
-def test_half_written_files_of_a_killed_session_are_removed_at_the_next_start(
-    tmp_path, case, capsys
-):
-    out = tmp_path / "run"
-    command = ["run", case, "--out", out, "--quiet", "--stages", "pack"]
-    assert answer(capsys, *command)[0] == 0
-    (out / "figures").mkdir()
-    for name in (".sections.999.part.csv", "figures/.sections.12.part.png", "pack/.x.7.part"):
-        (out / name).write_text("half")
-    (out / "my.part.csv").write_text("mine")
-    (out / "manifest.json").unlink(missing_ok=True)
-    assert answer(capsys, *command)[0] == 0
-    left = sorted(p.name for p in out.rglob("*.part*"))
-    assert left == ["my.part.csv"]
+    assert (tmp_path / "pipe").is_fifo()
 
 
 def test_a_half_table_of_a_killed_command_is_removed_by_the_next(tmp_path, capsys):
@@ -230,8 +203,6 @@ def test_a_half_table_of_a_killed_command_is_removed_by_the_next(tmp_path, capsy
 
 @pytest.mark.liggghts
 def test_the_home_folder_is_meant_by_a_tilde(tmp_path, case, capsys, monkeypatch):
-    import fdnet
-
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "home").mkdir()
     (tmp_path / "here").mkdir()

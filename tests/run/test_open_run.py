@@ -1,0 +1,457 @@
+"""A finished run: its tables as objects, and files that were changed are refused by name."""
+
+import errno
+import json
+import re
+import shutil
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from builders import TINY, naming, tiny
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import spsolve
+
+import fdnet
+from fdnet.case.file import case_from
+from fdnet.cli import main
+from fdnet.errors import CaseError, FdnetError
+from fdnet.report.tables import openpnm_arrays
+from fdnet.report.text import facts
+from fdnet.run import pipeline
+from fdnet.run.finished import FinishedRun
+from fdnet.run.folder import TABLES
+from fdnet.run.pipeline import run_stages
+from fdnet.run.records import RunOptions
+
+pytestmark = pytest.mark.liggghts
+STAGES = ("pack", "invade", "analyse")
+ANEW = "is not the file that the run wrote"
+
+
+@pytest.fixture(scope="module")
+def run(finished) -> FinishedRun:
+    """Fixed grains, periodic sides."""
+    return finished
+
+
+@pytest.fixture(scope="module")
+def mobile(tmp_path_factory) -> FinishedRun:
+    """Mobile grains between walls, analysed and not reported."""
+    case = tiny("run.cap_ms=0.2", "grains.motion=mobile")
+    out = tmp_path_factory.mktemp("mobile") / "run"
+    return fdnet.run_case(case, out, stages=("pack", "invade", "analyse"))
+
+
+@pytest.fixture(scope="module", params=["fixed", "mobile"])
+def either(request) -> FinishedRun:
+    """Either of the two."""
+    return request.getfixturevalue("run" if request.param == "fixed" else "mobile")
+
+
+@pytest.fixture
+def copied(run, tmp_path) -> Path:
+    return Path(shutil.copytree(run.path, tmp_path / "run"))
+
+
+def test_tables_agree_with_the_summary(run):
+    summary = run.summary
+    assert run.summary == json.loads((run.path / "summary.json").read_text())
+    assert len(run.sections) == len(summary["sections"]) == 3
+    assert run.sections["fines_count"].sum() == summary["invaded_count"] > 0
+    assert run.sections["k_initial_m2"].to_numpy() == pytest.approx(
+        [row["k_initial_m2"] for row in summary["sections"]], rel=1e-8, abs=0
+    )
+    assert (len(run.pores), len(run.throats)) == (summary["pores"], summary["throats"])
+    assert run.throats["blocked"].sum() == summary["throats_blocked"]
+    assert run.profile["x_hi_m"].iloc[-1] == run.case.size_m[0]
+    last = run.history.iloc[-1]
+    assert last["invaded"] == summary["invaded_count"]
+    assert last["time_s"] == pytest.approx(last["step"] * summary["dem_dt_s"], rel=1e-8, abs=0)
+    assert run.history["time_s"].is_monotonic_increasing
+    assert list(run.history["physical_time_s"]) == list(run.history["time_s"])
+    assert last["physical_time_s"] == pytest.approx(summary["physical_time_s"], rel=1e-8)
+    for name in ("invaded", "passed", "upstream", "supplied"):
+        assert last[f"{name}_count"] == summary[f"{name}_count"], name
+
+
+def test_its_spheres_and_its_last_dump_give_its_permeability_again(either):
+    """Every digit is stored; LIGGGHTS's own file of the last state is read as any dump."""
+    one, box = either, [(0.0, side) for side in either.case.size_m]
+    again = fdnet.analyse(
+        one.spheres("initial"),
+        one.spheres(),
+        periodic=one.case.periodic,
+        options=one.case.analysis,
+    )
+    assert again.k_initial == one.summary["k_initial_m2"]
+    assert again.k_damaged == one.summary["k_damaged_m2"]
+    step = int(one.history["step"].iloc[-1])
+    dump = fdnet.read_spheres(one.path / "invade" / "post" / f"invade_{step}.dump", box=box)
+    if one.case.grains.motion == "fixed":  # grains that cannot move are not dumped again
+        dump = fdnet.read_spheres(one.path / "pack" / "post" / "pack.dump", box=box).joined(dump)
+    table = fdnet.read_spheres(one.path / "spheres_damaged.csv", box=box)
+    assert len(dump) == len(table)
+    choices = {"periodic": one.case.periodic, "law": "lubrication", "damage_law": "section-archie"}
+    first, second = fdnet.analyse(dump, **choices), fdnet.analyse(table, **choices)
+    assert first.k_initial == pytest.approx(second.k_initial, rel=1e-9, abs=0)
+    assert first.k_damaged == pytest.approx(second.k_damaged, rel=1e-9, abs=0)
+    assert second.k_damaged < second.k_initial
+
+
+def test_its_network_is_the_one_of_its_tables(run):
+    network = run.network()
+    places = run.pores[[f"pore_coords_{k}_m" for k in range(3)]].to_numpy()
+    assert network.pore_position == pytest.approx(places, rel=1e-7, abs=1e-12)
+    flow = fdnet.solve_flow(network, run.conductance())
+    k = flow.inflow * float(np.ptp(network.box[0])) / network.area
+    assert run.summary["damage_law_used"] == "all-spheres"
+    assert k == pytest.approx(run.summary["k_damaged_other_m2"], rel=1e-7, abs=0)
+
+
+def test_its_meshes_are_ready_to_plot(run):
+    network, balls = run.network_mesh(), run.sphere_mesh("initial")
+    assert network.n_lines == run.summary["throats"]
+    assert "conductance_damaged_m3" in network.cell_data
+    grains = run.spheres("initial")
+    top = (grains.position + grains.radius[:, None]).max(axis=0)
+    assert np.array(balls.bounds)[1::2] == pytest.approx(top, rel=0.02, abs=0)
+    assert set(np.unique(balls.point_data["kind"])) == {1}
+
+
+def test_openpnm_finds_the_permeability_of_the_summary(either):
+    openpnm = pytest.importorskip("openpnm", reason="OpenPNM is not installed")
+    length, width, height = either.case.size_m
+    for state, law, number in (
+        ("initial", None, "k_initial_m2"),
+        ("damaged", None, "k_damaged_m2"),
+        ("damaged", "section-archie", "k_damaged_other_m2"),
+    ):
+        pores = either.to_openpnm(state, damage_law=law)
+        fluid = openpnm.phase.Phase(network=pores)
+        fluid["throat.hydraulic_conductance"] = pores["throat.hydraulic_conductance"]
+        stokes = openpnm.algorithms.StokesFlow(network=pores, phase=fluid)
+        stokes.set_value_BC(pores=pores.pores("inlet"), values=1.0)
+        stokes.set_value_BC(pores=pores.pores("outlet"), values=0.0)
+        stokes.run()
+        rate = float(stokes.rate(pores=pores.pores("inlet"))[0])
+        k = rate * either.case.fluid.viscosity_Pa_s * length / (width * height)
+        assert k == pytest.approx(either.summary[number], rel=1e-6, abs=0), (state, law)
+
+
+def test_the_arrays_for_openpnm_balance_without_it(either):
+    """Solved with plain linear algebra.
+
+    Throats across the periodic sides join both pores; throats in the side walls conduct by their
+    share inside.
+    """
+    run, fixed = either, either.case.grains.motion == "fixed"
+    network = run.network()
+    arrays = openpnm_arrays(network, run.conductance(), viscosity=2.0)
+    pair, g = arrays["throat.conns"], arrays["throat.hydraulic_conductance"]
+    count = len(arrays["pore.coords"])
+    assert np.all(pair[:, 0] < pair[:, 1])
+    assert arrays["throat.periodic"].any() == fixed
+    assert np.any(network.throat_share < 1) == (not fixed)
+    face = arrays["pore.inlet"] | arrays["pore.outlet"]
+    x = arrays["pore.coords"][:, 0]
+    assert x[arrays["pore.inlet"]] == pytest.approx(0.0, abs=1e-12)
+    assert x[arrays["pore.outlet"]] == pytest.approx(run.case.size_m[0], rel=1e-9, abs=0)
+    rows = np.concatenate([pair[:, 0], pair[:, 1]])
+    columns = np.concatenate([pair[:, 1], pair[:, 0]])
+    near = coo_matrix((np.tile(g, 2), (rows, columns)), shape=(count, count)).tocsr()
+    balance = -near.tolil()
+    balance.setdiag(np.asarray(near.sum(axis=1)).ravel())
+    balance = balance.tocsr()
+    pressure = arrays["pore.inlet"].astype(float)
+    inner = np.flatnonzero(~face)
+    pressure[inner] = spsolve(balance[inner][:, inner].tocsc(), -(balance[inner] @ pressure))
+    inflow = float((balance @ pressure)[arrays["pore.inlet"]].sum())
+    expected = fdnet.solve_flow(network, run.conductance()).inflow / 2.0
+    assert inflow == pytest.approx(expected, rel=1e-9, abs=0)
+
+
+def test_it_prints_in_the_units_of_the_field(run):
+    text = str(run)
+    summary = run.summary
+    assert f"fdnet run tiny in {run.path}" in text
+    assert f"{summary['k_initial_m2']:.3g} -> {summary['k_damaged_m2']:.3g} m2" in text
+    assert f"{100 * summary['k_reduction']:.1f} % lost" in text
+    line = re.search(r"\npermeability +([\d,]+) ->", text)
+    assert line
+    millidarcy = float(line[1].replace(",", ""))
+    assert text.splitlines()[1].startswith("95 % of the fines that entered lie within")
+    assert millidarcy == pytest.approx(summary["k_initial_m2"] / 9.869233e-16, rel=1e-3, abs=0)
+    assert max(len(line) for line in text.split("warning", maxsplit=1)[0].splitlines()) <= 120
+    assert repr(run) == f"FinishedRun('tiny', {str(run.path)!r})"
+    assert run._repr_html_().count("<tr>") == len(list(facts(summary))) + 1 + 3
+
+
+def test_a_run_without_fines_has_no_history(tmp_path):
+    case = case_from({key: value for key, value in TINY.items() if key != "fines"})
+    intact = fdnet.run_case(case, tmp_path / "run", stages=("pack", "analyse"))
+    assert len(intact.history) == 0
+    assert "time_s" in intact.history
+    assert "none supplied" in str(intact)
+    assert len(intact.spheres()) == len(intact.spheres("initial"))
+
+
+def test_the_answer_is_printed_before_the_figures_whose_failure_is_said(
+    copied, monkeypatch, capsys
+):
+    printed = []
+
+    def fail(results):
+        printed.append(capsys.readouterr().out)
+        raise OSError(errno.ENOSPC, "No space left on device", "depth.png")
+
+    monkeypatch.setattr(pipeline, "draw_figures", fail)
+    again = ["--stages", "analyse,report", "--force", "--quiet"]
+    assert main(["run", str(copied / "case.toml"), "--out", str(copied), *again]) == 2
+    assert printed[0].startswith("95 % of the fines that entered lie within")
+    assert "permeability" in printed[0]
+    assert "depth.png: No space left on device" in capsys.readouterr().err
+    assert (copied / "summary.json").exists()
+    assert not (copied / "manifest.json").exists()
+
+
+def test_a_finished_run_is_read_and_one_of_another_case_refused(run):
+    before = sorted(path.stat().st_mtime_ns for path in run.path.rglob("*"))
+    assert fdnet.run_case(run.case, run.path).summary == run.summary
+    again = partial(fdnet.run_case, stages=STAGES, resume=True, progress=False)
+    assert again(run.case, run.path).summary == run.summary
+    with pytest.raises(CaseError, match="holds a run of another case"):
+        again(case_from(run.case.data() | {"seed": 2}), run.path)
+    with pytest.raises(CaseError, match="expected 'initial'"):
+        run.spheres("final")
+    assert sorted(path.stat().st_mtime_ns for path in run.path.rglob("*")) == before
+
+
+# ------------------------------------------------------------------------------------------------
+# What is no finished run, and files that are not as the run wrote them.
+
+
+def test_what_is_no_finished_run_is_refused(copied, tmp_path):
+    (tmp_path / "a file").write_text("")
+    (tmp_path / "empty").mkdir()
+    for name, message in (
+        ("none", "does not exist"),
+        ("a file", "is a file"),
+        ("empty", "holds no fdnet run"),
+    ):
+        with pytest.raises(CaseError, match=message):
+            fdnet.open_run(tmp_path / name)
+    (copied / "manifest.json").unlink()
+    with pytest.raises(CaseError, match=r"unfinished run; continue it with .* --resume"):
+        fdnet.open_run(copied)
+    for stages in (("pack",), ("analyse", "rest"), "analyse", ()):
+        with naming(stages), pytest.raises(CaseError, match="with analyse or report among them"):
+            fdnet.run_case(tiny(), tmp_path / "new", stages=stages)
+    assert not (tmp_path / "new").exists()
+
+
+def test_damaged_records_and_tables_are_refused_with_what_to_do(run, tmp_path):
+    """By name, when the run is opened or the table read."""
+    again = "--stages analyse,report --force"
+    opens, summary = fdnet.open_run, lambda folder: fdnet.open_run(folder).summary
+    cases = [
+        ("manifest.json", lambda text: text[:50], opens, "cannot be read"),
+        ("manifest.json", without_files, opens, r"manifest\.json: .*files"),
+        ("case.toml", lambda text: text + "\nnonsense", opens, "case.toml"),
+        (
+            "case.toml",
+            lambda text: text.replace("seed = 1", "seed = 2", 1),
+            opens,
+            "is not the ca",
+        ),
+        ("summary.json", lambda text: "[1, 2]", summary, "is no summary"),
+        ("summary.json", lambda text: "{", summary, "cannot be read as JSON"),
+    ]
+    for table, change, message in (
+        ("throats", lambda text: text[: len(text) // 2], "rows, expected|cannot be read|number"),
+        ("sections", lambda text: "", "cannot be read as a table"),
+        ("pores", lambda text: text.replace("0.", "zero", 1), "no number"),
+        ("profile", lambda text: text.replace("x_lo_m", "x_lo"), "no column x_lo_m"),
+        ("sections", lambda text: text + text.splitlines()[-1] + "\n", "4 rows, expected 3"),
+        ("sections", one_digit, ANEW),
+        ("profile", one_digit, ANEW),
+        ("pores", one_digit, ANEW),
+        ("throats", one_digit, ANEW),
+    ):
+        read = partial(lambda folder, name: getattr(fdnet.open_run(folder), name), name=table)
+        cases.append((f"{table}.csv", change, read, f"{message}.*{again}|{again}.*{message}"))
+    damaged = lambda folder: fdnet.open_run(folder).spheres()  # noqa: E731
+    cases.append(("spheres_damaged.csv", one_digit, damaged, r"spheres_damaged\.csv"))
+    folder = Path(shutil.copytree(run.path, tmp_path / "run"))
+    for name, change, read, message in cases:
+        path = folder / name
+        whole = path.read_bytes()
+        path.write_text(change(path.read_text()))
+        with naming(name, message), pytest.raises(CaseError, match=message) as caught:
+            read(folder)
+        assert name in str(caught.value)
+        path.write_bytes(whole)
+    for name in ("pores", "layers", "history"):
+        (folder / f"{name}.csv").rename(folder / "away")
+        with naming(name), pytest.raises(CaseError, match=rf"{name}\.csv"):
+            getattr(fdnet.open_run(folder), name)
+        (folder / "away").rename(folder / f"{name}.csv")
+    assert fdnet.open_run(folder).summary == run.summary
+
+
+def without_files(text: str) -> str:
+    manifest = json.loads(text)
+    del manifest["files"]
+    return json.dumps(manifest)
+
+
+def one_digit(text: str) -> str:
+    """Another number in the first row."""
+    title, _, rows = text.partition("\n")
+    return title + "\n" + rows.replace("1", "2", 1)
+
+
+def test_a_changed_mesh_is_refused_and_a_missing_one_is_not_needed(run, copied):
+    """A mesh that ParaView reads and saves again is another one."""
+    meshes = {
+        "network.vtp": FinishedRun.network_mesh,
+        "spheres_initial.vtp": lambda opened: opened.sphere_mesh("initial"),
+        "spheres_damaged.vtp": FinishedRun.sphere_mesh,
+    }
+    for name, read in meshes.items():
+        path = copied / name
+        path.write_bytes(path.read_bytes() + b"\n")
+        opened = fdnet.open_run(copied)
+        with pytest.raises(CaseError, match=rf"{name}: is not the file that the run wrote"):
+            read(opened)
+        with pytest.raises(CaseError, match=rf"{name}: is not the file that the run wrote"):
+            fdnet.run_case(run.case, copied)
+        path.unlink()
+    assert fdnet.run_case(run.case, copied).summary == run.summary
+
+
+def test_meshes_that_were_not_written_are_named(mobile, copied):
+    with pytest.raises(CaseError, match=r"network.vtp: is missing; .*--stages report"):
+        mobile.network_mesh()
+    (copied / "network.vtp").write_text("<VTKFile")
+    with pytest.raises(CaseError, match=r"network.vtp: "):
+        fdnet.open_run(copied).network_mesh()
+
+
+def last_dump(folder: Path) -> Path:
+    step = (folder / "invade" / "history.csv").read_text().splitlines()[-1].split(",")[1]
+    return folder / "invade" / "post" / f"invade_{step}.dump"
+
+
+def dump_without_a_row(path: Path) -> None:
+    lines = path.read_text().splitlines(keepends=True)
+    lines[3] = f"{int(lines[3]) - 1}\n"
+    path.write_text("".join(lines[:-1]))
+
+
+def dump_with_another_radius(path: Path) -> None:
+    """A dump that can be read; LIGGGHTS ends each row with a space."""
+    lines = path.read_text().splitlines(keepends=True)
+    words = lines[-1].split()
+    lines[-1] = " ".join([*words[:-1], repr(1.01 * float(words[-1]))]) + " \n"
+    path.write_text("".join(lines))
+
+
+def dump_with_a_moved_sphere(path: Path) -> None:
+    lines = path.read_text().splitlines(keepends=True)
+    words = lines[-1].split()
+    lines[-1] = " ".join([*words[:2], repr(float(words[2]) + 1e-6), *words[3:]]) + " \n"
+    path.write_text("".join(lines))
+
+
+def one_row_less(path: Path) -> None:
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join([lines[0], *lines[2:]]))
+
+
+SPOILT = {
+    "a grain dropped": ("pack/post/pack.dump", dump_without_a_row),
+    "a grain's radius": ("pack/post/pack.dump", dump_with_another_radius),
+    "a grain moved": ("pack/post/pack.dump", dump_with_a_moved_sphere),
+    "a fine dropped": ("last", dump_without_a_row),
+    "a fine's radius": ("last", dump_with_another_radius),
+    "a fine moved": ("last", dump_with_a_moved_sphere),
+    "the dump gone": ("last", Path.unlink),
+    "a row of the history": ("invade/history.csv", one_row_less),
+    "a row of the overlap": ("invade/overlap.csv", one_row_less),
+    "the overlap gone": ("invade/overlap.csv", Path.unlink),
+}
+
+
+def options(folder: Path, **changes) -> RunOptions:
+    return RunOptions(out=folder, show_progress=False, **({"stages": STAGES} | changes))
+
+
+@pytest.mark.parametrize("how", ["finished", "again", "resumed"])
+def test_a_changed_file_of_a_stage_is_refused(run, copied, how):
+    if how == "resumed":
+        (copied / "manifest.json").unlink()
+    again = {"stages": ("analyse",), "force": True}
+    changes = {"finished": {}, "again": again, "resumed": {"resume": True}}[how]
+    for what, (name, spoil) in SPOILT.items():
+        path = last_dump(copied) if name == "last" else copied / name
+        whole = path.read_bytes()
+        spoil(path)
+        if what == "the dump gone" and how == "finished":
+            assert run_stages(run.case, options(copied)), "dumps may be removed"
+        else:
+            with naming(what), pytest.raises(FdnetError, match=path.name):
+                run_stages(run.case, options(copied, **changes))
+        path.write_bytes(whole)
+
+
+def test_a_changed_table_of_a_finished_run_is_refused(run, copied):
+    for name in (*TABLES, "pack/stage.json", "invade/stage.json"):
+        path = copied / name
+        text = path.read_text()
+        path.write_text(text.replace("1", "2", 1))
+        with naming(name), pytest.raises(CaseError, match=rf"{path.name}: {ANEW}"):
+            run_stages(run.case, options(copied))
+        path.write_text(text)
+
+
+def test_records_whose_digests_or_ranks_are_missing_or_odd_are_refused(run, copied):
+    (copied / "manifest.json").unlink()
+    for name, key, value, message in (
+        ("invade", "files", [], "cannot be understood"),
+        ("invade", "files", "x", "cannot be understood"),
+        ("invade", "files", {"history.csv": 1}, "cannot be understood"),
+        ("pack", "files", None, r"pack/stage\.json: .*the key files is missing"),
+        ("pack", "ranks", None, r"pack/stage\.json: .*the key ranks is missing"),
+    ):
+        path = copied / name / "stage.json"
+        text = path.read_text()
+        record = {k: v for k, v in json.loads(text).items() if k != key}
+        path.write_text(json.dumps(record if value is None else record | {key: value}))
+        with naming(name, key, value), pytest.raises(CaseError, match=message):
+            run_stages(run.case, options(copied, resume=True))
+        path.write_text(text)
+
+
+def test_a_run_that_was_cut_after_its_pack_goes_on_with_its_ranks(run, copied):
+    (copied / "manifest.json").unlink()
+    shutil.rmtree(copied / "invade")
+    with pytest.raises(CaseError, match=r"begun with --np 1, .* continue with --np 1"):
+        run_stages(run.case, options(copied, resume=True, ranks=2))
+    assert run_stages(run.case, options(copied, resume=True))["ranks"] == {"pack": 1, "invade": 1}
+
+
+def test_a_run_ends_well_though_the_reader_of_its_answer_has_gone(copied):
+    """`fdnet run ... | less`, closed with q: its manifest is still written."""
+    stages = "--stages analyse --force --quiet"
+    line = (
+        f"'{sys.executable}' -m fdnet.cli run {copied}/case.toml --out {copied} {stages} | true; "
+    )
+    ended = ["bash", "-c", line + 'echo "${PIPESTATUS[0]}"']
+    done = subprocess.run(ended, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "0", done.stderr
+    assert not (copied / ".unfinished").exists()
+    assert (copied / "manifest.json").exists()
