@@ -144,7 +144,7 @@ def balanced_slip(stokes_slip: float, reynolds: float) -> float:
 #
 # The problem is that of W. L. Haberman and R. M. Sayre, David Taylor Model Basin Report 1143
 # (1958). Their approximate formula is up to 1.3 % too low at a ratio of 0.5 and 13 % at 0.7. The
-# values here are solved anew by boundary collocation (tests/forces/test_throat.py does it again)
+# values here are solved anew by boundary collocation (tests/forces/test_forces.py does it again)
 # and agree with the formula where that is good.
 
 

@@ -5,8 +5,6 @@ Oosterom and Strackee 1983 (IEEE Trans. Biomed. Eng. 30, 125, eq. 8); touching c
 Apollonius' problem by subtracting the sphere equations; lens of two spheres, the sum of two caps.
 """
 
-from itertools import combinations
-
 import numpy as np
 
 from fdnet.spheres.snapshot import Array
@@ -21,28 +19,6 @@ def triangle_area(triangle: Array) -> Array:
     """Area (...) m2 of triangles (..., 3, 3)."""
     side = triangle[..., 1:, :] - triangle[..., :1, :]
     return 0.5 * np.linalg.norm(np.cross(side[..., 0, :], side[..., 1, :]), axis=-1)
-
-
-def solid_angles(corner: Array) -> Array:
-    """Solid angle (..., 4) sr at each corner of tetrahedra (..., 4, 3)."""
-    angles = []
-    for k in range(4):
-        side = np.delete(corner, k, axis=-2) - corner[..., k : k + 1, :]
-        la, lb, lc = np.moveaxis(np.linalg.norm(side, axis=-1), -1, 0)
-        gram = side @ np.swapaxes(side, -1, -2)
-        below = la * lb * lc + gram[..., 0, 1] * lc + gram[..., 0, 2] * lb + gram[..., 1, 2] * la
-        angles.append(2.0 * np.arctan2(np.abs(np.linalg.det(side)), below))
-    return np.stack(angles, axis=-1)
-
-
-def dihedral_angle(corner: Array, i: int, j: int) -> Array:
-    """Angle (...) rad between the two faces at the edge from corner `i` to `j`."""
-    axis = corner[..., j, :] - corner[..., i, :]
-    left, right = (
-        np.cross(axis, corner[..., k, :] - corner[..., i, :]) for k in {0, 1, 2, 3} - {i, j}
-    )
-    along = np.linalg.norm(np.cross(left, right), axis=-1)
-    return np.arctan2(along, np.sum(left * right, axis=-1))
 
 
 def touching(corner: Array, radius: Array) -> tuple[Array, Array]:
@@ -75,17 +51,6 @@ def touching_circle(triangle: Array, radius: Array) -> Array:
     return touching(flat.reshape(*along.shape, 3, 2), radius)[1]
 
 
-def power_centre(corner: Array, radius: Array) -> tuple[Array, Array]:
-    """Point (..., n) of equal power |x - p|^2 - r^2 to n + 1 spheres, and that power (...) m2.
-
-    A vertex of the power tessellation; Aurenhammer 1987 (SIAM J. Comput. 16, 78).
-    """
-    side, first = corner[..., 1:, :] - corner[..., :1, :], radius[..., :1]
-    half = 0.5 * (np.sum(side**2, axis=-1) + first**2 - radius[..., 1:] ** 2)
-    offset = np.linalg.solve(side, half[..., None])[..., 0]
-    return corner[..., 0, :] + offset, np.sum(offset**2, axis=-1) - first[..., 0] ** 2
-
-
 def disc_lens_area(first: Array, second: Array, apart: Array) -> Array:
     """Area (...) m2 common to discs of radius `first` and `second`, centres `apart` (...) m."""
     a, b, d = np.broadcast_arrays(first, second, np.maximum(apart, 1e-100))
@@ -112,30 +77,3 @@ def open_area(triangle: Array, radius: Array) -> Array:
         area = area - 0.5 * angle * radius[..., k] ** 2
         area = area + 0.5 * disc_lens_area(radius[..., k], other, apart)
     return area
-
-
-def cap_volume(radius: Array, height: Array) -> Array:
-    """Volume (...) m3 of caps of spheres."""
-    return np.pi * height**2 * (3.0 * radius - height) / 3.0
-
-
-def solid_in_tetrahedra(corner: Array, radius: Array) -> tuple[Array, Array]:
-    """Volume (P,) m3 and surface (P,) m2 of the spheres on the corners within each tetrahedron.
-
-    Sphere wedges by solid angle, less the overlap of each pair by dihedral angle: exact over a
-    whole tessellation, and in one tetrahedron as long as no sphere reaches through the opposite
-    face and no three overlap.
-    """
-    angle = solid_angles(corner)
-    volume, surface = np.sum(angle * radius**3, axis=1) / 3.0, np.sum(angle * radius**2, axis=1)
-    for i, j in combinations(range(4), 2):
-        first, second = radius[:, i], radius[:, j]
-        apart = np.linalg.norm(corner[:, j] - corner[:, i], axis=-1)
-        to_plane = (apart**2 + first**2 - second**2) / (2.0 * apart)
-        overlap = apart < first + second
-        one = np.where(overlap, np.clip(first - to_plane, 0.0, 2.0 * first), 0.0)
-        other = np.where(overlap, np.clip(second - apart + to_plane, 0.0, 2.0 * second), 0.0)
-        turn = dihedral_angle(corner, i, j) / (2.0 * np.pi)
-        volume -= turn * (cap_volume(first, one) + cap_volume(second, other))
-        surface -= turn * 2.0 * np.pi * (first * one + second * other)
-    return volume, surface

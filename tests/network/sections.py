@@ -21,7 +21,6 @@ from fdnet.network.laws.cross_section import (
     even_fluxes,
     even_room,
     tangents,
-    touching_fluxes,
     uneven_fluxes,
     uneven_room,
     wall_fluxes,
@@ -61,13 +60,6 @@ def uneven_flux(base: Array, disc: Array) -> float:
     flux, given = np.empty((1, 1)), sections_with(np.asarray(disc)[:, None])
     uneven_fluxes(FIRST, given, base[None], ratio_table(), uneven_room(1), flux)
     return float(flux[0, 0])
-
-
-def touching_flux(base: Array, disc: Array) -> float:
-    """Flux m4 of the signed shares of three discs that a circle touches, else 0."""
-    flux, discs = np.empty(1), np.ascontiguousarray(disc[:, None])
-    from_python(touching_fluxes)(base, discs, ratio_table(), uneven_room(1), flux)
-    return float(flux[0])
 
 
 def wall_flux(place: Any, first: Any, second: Any) -> Any:

