@@ -41,8 +41,8 @@ def pooled_classes(tables: Sequence[pd.DataFrame]) -> list[dict[str, Any]]:
     keys = ["concentration", "ratio_lo", "ratio_hi"]
     sums = every.groupby(keys)[[*COUNTS, "came"]].sum()
     return [
-        class_row(*key, [int(row[name]) for name in COUNTS], float(row["came"]))
-        for key, (_, row) in zip(sums.index, sums.iterrows(), strict=True)
+        class_row(one, low, high, [int(row[name]) for name in COUNTS], float(row["came"]))
+        for (one, low, high), (_, row) in zip(sums.index, sums.iterrows(), strict=True)
     ]
 
 

@@ -13,7 +13,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -98,50 +98,53 @@ def percent(error: float) -> str:
     return f"{100 * error:+.2g} %".replace("-", "−")
 
 
-def comparisons_of(
-    table: Path,
-    measures: Mapping[str, Callable[[Trial], Mapping[str, float]]],
-    judges: Mapping[str, Judge],
-    exact: Mapping[str, Callable[[Any], float]],
-) -> tuple[Comparison, ...]:
-    """The comparisons of a TOML table; it names its functions as the mappings do."""
+def chapter_of(
+    table: Path, functions: Mapping[str, Any], panel: Callable[[Any, pd.DataFrame], None]
+) -> Chapter:
+    """The chapter of a TOML table, which names its functions as the mapping does.
+
+    A comparison has the function that measures it (and its further `arguments`), and one that
+    judges it or lines with what is expected.
+    """
     parts = tomllib.loads(table.read_text(encoding="utf-8"))["comparison"]
-    return tuple(
+    comparisons = tuple(
         Comparison(
             name=part["name"],
             full=dict(part["full"]),
             quick=dict(part["quick"]),
-            measure=measures[part["measure"]],
-            judge=judges[part["judge"]] if "judge" in part else _by_lines(part["line"], exact),
+            measure=partial(functions[part["measure"]], **part.get("arguments", {})),
+            judge=functions[part["judge"]]
+            if "judge" in part
+            else partial(_by_lines, lines=part.get("line", []), exact=functions),
             of=tuple(part.get("of", [part["name"]])),
         )
         for part in parts
     )
+    return Chapter(comparisons, panel)
 
 
 def _by_lines(
-    lines: Sequence[Mapping[str, Any]], exact: Mapping[str, Callable[[Any], float]]
-) -> Judge:
-    return lambda rows: [one for line in lines for one in _worst(rows, line, exact)]
-
-
-def _worst(
-    rows: pd.DataFrame, line: Mapping[str, Any], exact: Mapping[str, Callable[[Any], float]]
+    rows: pd.DataFrame, *, lines: Sequence[Mapping[str, Any]], exact: Mapping[str, Any]
 ) -> list[Finding]:
-    """The worst error of a line of the table; nothing without a row."""
-    rows = rows[rows.value.isin(line.get("values", rows.value))]
-    rows = rows[rows.quantity.str.contains(line.get("quantity", ""), regex=False)]
-    if rows.empty:
-        return []
-    law, within = line.get("exact", 0.0), line["within"]
-    truth = rows.value.map(exact[law] if isinstance(law, str) else lambda _: float(law))
-    error = (rows.observed - truth) / truth.abs().where(truth != 0, 1.0)
-    at = error.index[int(np.argmax(np.abs(error.to_numpy())))]
-    size = f"{rows.observed[at]:.4g}, " if truth[at] and np.isfinite(error[at]) else ""
-    worst = f", worst of {len(rows)}" if len(rows) > 1 else ""
-    expected = f"{line['expected']} ± {100 * within:g} %"
-    seen = f"{size}{percent(error[at])}{worst}"
-    return [Finding(line["what"], expected, line["source"], seen, error[at] / within)]
+    """The worst error of each line of the table that has a row."""
+    every = []
+    for line in lines:
+        own = rows[rows.value.isin(line.get("values", rows.value))]
+        own = own[own.quantity.str.contains(line.get("quantity", ""), regex=False)]
+        if own.empty:
+            continue
+        law, within = line.get("exact", 0.0), line["within"]
+        truth = own.value.map(
+            exact[law] if isinstance(law, str) else lambda _, law=law: float(law)
+        )
+        error = (own.observed - truth) / truth.abs().where(truth != 0, 1.0)
+        at = error.index[int(np.argmax(np.abs(error.to_numpy())))]
+        size = f"{own.observed[at]:.4g}, " if truth[at] and np.isfinite(error[at]) else ""
+        worst = f", worst of {len(own)}" if len(own) > 1 else ""
+        expected = f"{line['expected']} ± {100 * within:g} %"
+        seen = f"{size}{percent(error[at])}{worst}"
+        every.append(Finding(line["what"], expected, line["source"], seen, error[at] / within))
+    return every
 
 
 def read_rows(path: Path) -> pd.DataFrame:

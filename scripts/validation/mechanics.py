@@ -1,4 +1,4 @@
-"""The mechanics of packs: size, load steps, the same test in LIGGGHTS, and sand under stress.
+"""The mechanics of packs: size, the same test in LIGGGHTS, sand under stress, bonds in the flow.
 
     python scripts/validation.py mechanics [--quick] [--only NAME] [--out DIR] [--rows FILE.csv]
 
@@ -7,7 +7,6 @@ The rows of all runs are in docs/validation/mechanics.csv, the answer in docs/ev
 
 import math
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -42,11 +41,10 @@ from validation.comparisons import (
     BLUE,
     ORANGE,
     TEMPLATES,
-    Chapter,
     Finding,
     Trial,
+    chapter_of,
     command,
-    comparisons_of,
     packed,
     the_binary,
 )
@@ -58,8 +56,8 @@ TREND = 0.0021
 """Fall of ln k with stress, 1/MPa (Nazarova and others, J. Mining Sci. 55, 708, 2019)."""
 ITSELF = "fdnet itself"
 """Source of what is compared with a finer or larger form of the same."""
-QUARTZ, FIELD = 9.43e7, 7.2e6
-"""Normal stiffness, N/m: 4 E R of quartz, and one whose pack has the thesis's 4.8 GPa."""
+QUARTZ = 9.43e7
+"""Normal stiffness of quartz, 4 E R, N/m; 7.2e6 gives a pack the thesis's 4.8 GPa."""
 
 
 def case_of(
@@ -78,20 +76,12 @@ def case_of(
     return case_from(tables | ({"run": {"stiffness_N_m": "nominal"}} if stiffness == 2e4 else {}))
 
 
-def _moduli(trial: Trial, sides: str) -> dict[str, float]:
+def moduli(trial: Trial, *, sides: str) -> dict[str, float]:
+    """Young's and shear modulus of one cube."""
     case = case_of(trial.seed, trial.value, sides)
     grains = packed(case, trial.folder.parent)
     result = elastic_of(grains, pack_material(case, grains), periodic=case.periodic).averaged
     return {"young": result.young, "shear": result.shear}
-
-
-def _steps(trial: Trial, cement: Cement | None) -> dict[str, float]:
-    case = case_of(trial.seed, 1.9, "periodic")
-    grains = packed(case, trial.folder.parent)
-    material = replace(pack_material(case, grains), cement=cement)
-    test = Triaxial(confining=PRESSURE, strain=0.012, steps=int(trial.value))
-    result = triaxial(grains, material, test, periodic=case.periodic)
-    return {"peak": result.peak.deviatoric, "volume_strain": result.rows[-1].volume_strain}
 
 
 # ---- The triaxial test in LIGGGHTS: six smooth plates, whose stresses are held by servo.
@@ -169,7 +159,7 @@ def _plate(axis: int, place: float, side: Array) -> str:
     return text + "endsolid plate\n"
 
 
-def _test(trial: Trial, liggghts: bool) -> dict[str, float]:
+def unbonded(trial: Trial, *, liggghts: bool) -> dict[str, float]:
     """Axial over side stress and volume of a pack that LIGGGHTS pressed, by strain."""
     case = case_of(trial.seed, 2.4, "walls")
     grains = packed(case, trial.folder.parent)
@@ -193,7 +183,8 @@ def _test(trial: Trial, liggghts: bool) -> dict[str, float]:
 # ---- Sand under isotropic stress, and bonded grains in the flow.
 
 
-def _stress(trial: Trial, stiffness: float) -> dict[str, float]:
+def stress(trial: Trial, *, stiffness: float) -> dict[str, float]:
+    """Porosity and permeability under the stress of the trial, MPa."""
     case = case_of(trial.seed, 2.4, "periodic", stiffness)
     grains = packed(case, trial.folder.parent)
     if trial.value:
@@ -227,7 +218,7 @@ def displacement_under_flow(
     return moved.reshape(-1, 6)[:, :3]
 
 
-def _bonds(trial: Trial, normal: float, shear: float) -> dict[str, float]:
+def bonds(trial: Trial, *, normal: float, shear: float) -> dict[str, float]:
     """The largest displacement by the thesis's fall of pressure, 3.5 MPa over 8 mm."""
     case = case_of(trial.seed, 2.4, "periodic", QUARTZ, trial.value)
     grains = packed(case, trial.folder.parent)
@@ -241,35 +232,24 @@ def _bonds(trial: Trial, normal: float, shear: float) -> dict[str, float]:
 # ---- The judges.
 
 
-def _means(rows: pd.DataFrame, quantity: str) -> "pd.Series[float]":
-    return rows[rows.quantity == quantity].groupby(["comparison", "value"])["observed"].mean()
-
-
-def _judge_moduli(rows: pd.DataFrame) -> list[Finding]:
-    young = _means(rows, "young")
-    if not len(young):
-        return []
-    most = young["moduli, periodic sides"].index.max()
+def judge_moduli(rows: pd.DataFrame) -> list[Finding]:
+    """Young's modulus over that of the largest periodic cube."""
+    own = rows[rows.quantity == "young"]
+    young = {
+        (name, edge): float(own[(own.comparison == name) & (own.value == edge)].observed.mean())
+        for name, edge in sorted(set(zip(own.comparison, own.value, strict=True)))
+    }
+    most = max((edge for name, edge in young if "periodic" in name), default=0.0)
     lines = []
     for (name, edge), value in young.items():
-        share = value / young["moduli, periodic sides", most]
-        if edge < most and (name.startswith("moduli, walls") or edge == min(young.index)[1]):
+        share = value / young.get(("moduli, periodic sides", most), math.nan)
+        if edge < most and ("walls" in name or edge == min(edge for _, edge in young)):
             what = f"{name}: Young's, {edge:g} mm over {most:g} mm"
             lines.append(Finding(what, "1 ± 10 %", ITSELF, f"{share:.3f}", (share - 1) / 0.1))
     return lines
 
 
-def _judge_steps(rows: pd.DataFrame) -> list[Finding]:
-    peak = rows[rows.quantity == "peak"].groupby("value")["observed"].mean()
-    if len(peak) < 2:
-        return []
-    few, most = sorted(peak.index)[-2:]
-    share = peak[few] / peak[most]
-    what = f"peak, {few:g} over {most:g} {rows.comparison.iloc[0]}"
-    return [Finding(what, "1 ± 2 %", ITSELF, f"{share:.3f}", (share - 1) / 0.02)]
-
-
-def _judge_test(rows: pd.DataFrame) -> list[Finding]:
+def judge_test(rows: pd.DataFrame) -> list[Finding]:
     """Differences of equal seeds and their 95 % bands (Student)."""
     words = {
         "slope": "triaxial test: slope at 0.2 %",
@@ -292,7 +272,8 @@ def _judge_test(rows: pd.DataFrame) -> list[Finding]:
     return lines
 
 
-def _judge_stress(rows: pd.DataFrame) -> list[Finding]:
+def judge_stress(rows: pd.DataFrame) -> list[Finding]:
+    """Permeability at the largest stress over that without."""
     k = rows[rows.quantity == "k"].groupby("value")["observed"].mean()
     if len(k) < 2:
         return []
@@ -303,7 +284,8 @@ def _judge_stress(rows: pd.DataFrame) -> list[Finding]:
     return [Finding(what, f"{law:.3f} ± 0.02", "Nazarova 2019", f"{share:.3f}", over)]
 
 
-def _judge_moved(rows: pd.DataFrame) -> list[Finding]:
+def judge_moved(rows: pd.DataFrame) -> list[Finding]:
+    """The largest displacement over the radius of a grain."""
     if rows.empty:
         return []
     moved, what = (
@@ -331,36 +313,7 @@ def draw_stress(axes: Any, rows: pd.DataFrame) -> None:
     axes.legend(fontsize=8)
 
 
-CEMENT = Cement(
-    radius_ratio=0.5, normal=2e10, shear=8e9, tensile_strength=1.2e5, shear_strength=1.2e5
-)
-CHAPTER = Chapter(
-    comparisons=comparisons_of(
-        Path(__file__).with_suffix(".toml"),
-        {
-            "moduli_walls": partial(_moduli, sides="walls"),
-            "moduli_periodic": partial(_moduli, sides="periodic"),
-            "steps_bare": partial(_steps, cement=None),
-            "steps_bonded": partial(_steps, cement=CEMENT),
-            "test_static": partial(_test, liggghts=False),
-            "test_liggghts": partial(_test, liggghts=True),
-            "stress_quartz": partial(_stress, stiffness=QUARTZ),
-            "stress_field": partial(_stress, stiffness=FIELD),
-            "bonds_thesis": partial(_bonds, normal=95e9, shear=40e9),
-            "bonds_field": partial(_bonds, normal=1.84e13, shear=7.7e12),
-        },
-        {
-            "nothing": lambda _: [],
-            "moduli": _judge_moduli,
-            "steps": _judge_steps,
-            "test": _judge_test,
-            "stress": _judge_stress,
-            "moved": _judge_moved,
-        },
-        {},
-    ),
-    panel=draw_stress,
-)
+CHAPTER = chapter_of(Path(__file__).with_suffix(".toml"), globals(), draw_stress)
 
 
 def main(arguments: list[str]) -> int:

@@ -7,7 +7,7 @@ The rows of all runs are in docs/validation/outside.csv, the answer in docs/evid
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -38,11 +38,10 @@ from validation.comparisons import (
     BLUE,
     ORANGE,
     TEMPLATES,
-    Chapter,
     Finding,
     Trial,
+    chapter_of,
     command,
-    comparisons_of,
     packed,
     the_binary,
 )
@@ -174,7 +173,7 @@ def passes(ratio: float, overlap: float, folder: Path, *, seed: int) -> bool:
     return bool(end.column("xu")[0] > 0.3 * GRAIN)
 
 
-def _throat(trial: Trial) -> Seen:
+def throat(trial: Trial) -> Seen:
     """Bisected from 2 % below to 2 % above the closed form."""
     low, high = (share * passing_ratio(trial.value) for share in (0.98, 1.02))
     ends = [passes(end, trial.value, trial.folder, seed=trial.seed) for end in (low, high)]
@@ -189,7 +188,7 @@ def _throat(trial: Trial) -> Seen:
 # ---- Single fines in a pack without overlap: three grains leave 0.1547 of a diameter.
 
 
-def _held(trial: Trial) -> Seen:
+def held(trial: Trial) -> Seen:
     """fdnet's own pack and invasion, but for a line that keeps fines from touching each other."""
     length, side, fines = (2.0, 1.6, 400) if trial.quick else (4.0, 2.0, 1000)
     count = round(0.58 * length * side**2 / sphere_mass(0.25, 1.0))
@@ -203,11 +202,9 @@ def _held(trial: Trial) -> Seen:
         "drag": {"scheme": "viscous", "upstream": "interstitial", "pressure_gradient": False},
         "run": {"duration_ms": 5 * length, "checkpoint_ms": 0.25 * length},
     }
-    case, folder = (
-        with_fines(case_from(set_keys(tables, ["run.time_step_factor=0.2"]))),
-        trial.folder,
-    )
-    grains, scales = packed(case, folder.parent), invasion_scales(case)
+    case = with_fines(case_from(set_keys(tables, ["run.time_step_factor=0.2"])))
+    grains, scales = packed(case, trial.folder.parent), invasion_scales(case)
+    folder = trial.folder
     (folder / "post").mkdir(parents=True)
     alone = "neigh_modify delay 0\nneigh_modify exclude type 2 2"
     text = write_invade_inputs(case, scales, grains, folder, ranks=1).text
@@ -225,7 +222,8 @@ def _held(trial: Trial) -> Seen:
     return {"held": float(last.invaded), "supplied": supplied, "overlap of grains": overlap}
 
 
-def _judge_held(rows: pd.DataFrame) -> list[Finding]:
+def judge_held(rows: pd.DataFrame) -> list[Finding]:
+    """Shares of all packs together with their bands (Clopper and Pearson 1934)."""
     lines = []
     for ratio, expected in ((7.0, "at most 1 %"), (5.0, "most of them")):
         sums = rows[rows.value == ratio].groupby("quantity")["observed"].sum()
@@ -283,7 +281,7 @@ def heap_of(ratio: float, seed: int) -> Snapshot:
     return resting(np.vstack([wall, placed]), radius, box, kinds)
 
 
-def _discharge(trial: Trial, friction: float) -> Seen:
+def discharge(trial: Trial, *, friction: float) -> Seen:
     """Fines that escape; the box is periodic along x, so they fall on the heap again."""
     rare = trial.value > (2.25 if friction == 0.1 else 3.0)
     most = (20.0 if rare else 200.0) if trial.quick else (300.0 if rare else 800.0)
@@ -373,7 +371,8 @@ def holes_of(rows: pd.DataFrame) -> dict[float, Clogging]:
     }
 
 
-def _judge_low(rows: pd.DataFrame) -> list[Finding]:
+def judge_low(rows: pd.DataFrame) -> list[Finding]:
+    """Below and above three diameters at low friction, and the laws of clogs."""
     source, holes = "Marin and others 2018", holes_of(rows)
     below, above = rows[rows.value < 3], {r: one for r, one in holes.items() if r >= 3}
     stopped, free = int((below.quantity == CLOGGED).sum()), holes.get(2.75)
@@ -389,7 +388,8 @@ def _judge_low(rows: pd.DataFrame) -> list[Finding]:
     return lines + _judge_laws(holes, "0.1")
 
 
-def _judge_high(rows: pd.DataFrame) -> list[Finding]:
+def judge_high(rows: pd.DataFrame) -> list[Finding]:
+    """The range in which a flow stops and starts again, and the laws of clogs."""
     holes = holes_of(rows)
     wide = [one for r, one in holes.items() if r >= 3.03]
     seen = f"{sum(one.clogs for one in wide)} clogs in {sum(sum(o.counts) for o in wide):,} fines"
@@ -435,7 +435,7 @@ def _judge_laws(holes: Mapping[float, Clogging], friction: str) -> list[Finding]
 DROP, LIFT = "pressure drop, Pa", "velocity that lifts the bed, m/s"
 
 
-def _ergun(trial: Trial) -> Seen:
+def ergun(trial: Trial) -> Seen:
     """Spheres of 1 mm in a liquid of 1.5 mPa s: 0.02 m/s through 15.6 mm, and its own weight."""
     diameter, porosity, viscosity, density, length = 1e-3, 0.451335, 1.5e-3, 10.0, straight(0.0156)
     permeability = diameter**2 * porosity**3 / (150 * (1 - porosity) ** 2)
@@ -454,7 +454,7 @@ OBLIQUE, GRADIENT, INERTIA = "oblique gravity", "pressure gradient", "finite Rey
 PULL = {OBLIQUE: (1.2e4, -0.9e4, -2.0e4), INERTIA: (0.0, 0.0, -6e3)}
 
 
-def _free(trial: Trial) -> Seen:
+def free(trial: Trial) -> Seen:
     """Distance of the last velocity from the balance, over the slip; far from one grain."""
     pull, thin = PULL.get(trial.value), 0.1 if trial.value == INERTIA else 1.0
     tables = {
@@ -503,7 +503,8 @@ def resisted_gain(slope: float, resistance: float = 0.2) -> float:
     return 5 / 7 * max(0.0, math.sin(angle) - resistance * math.cos(angle))
 
 
-def _slope(trial: Trial, *settings: str) -> Seen:
+def slope(trial: Trial, *, settings: Sequence[str] = ()) -> Seen:
+    """Acceleration over g of a fine that started at rest, once it is steady."""
     stiffness, steps, step = 10.0, 20_000, contact_step(FINE, 10.0, 0.1)
     rough = [f"{key}=0.3" for key in ("grains.friction", "fines.friction", "box.wall_friction")]
     case = case_of(stiffness, *rough, *settings)
@@ -525,7 +526,7 @@ def _slope(trial: Trial, *settings: str) -> Seen:
 LINEAR, HERTZ = "linear, damped", "Hertz, undamped"
 
 
-def _collision(trial: Trial) -> Seen:
+def collision(trial: Trial) -> Seen:
     """Errors of the largest overlap, and of the restitution or the duration."""
     linear, stiffness, middle = trial.value == LINEAR, 1e4, 20 * FINE
     zeta, speed = (0.2, 5.0) if linear else (0.0, 1.0)
@@ -568,19 +569,14 @@ def leaving_time(stiffness: float, shear: float, step: float, folder: Path) -> f
     """
     grain, fine, density, start = 5e-3, 2.5e-4, 2500.0, math.radians(1.0)
     zeta = math.log(2) / math.hypot(math.pi, math.log(2))
-    own = ("friction=0.5", f"damping_ratio={zeta!r}")
-    own = (*own, f"shear_stiffness_N_m={2 * shear * stiffness!r}", f"density_kg_m3={density}")
+    own = ["friction=0.5", f"damping_ratio={zeta!r}", f"density_kg_m3={density}"]
+    own += [f"shear_stiffness_N_m={2 * shear * stiffness!r}"]
     both = [f"{kind}.{part}" for kind in ("grains", "fines") for part in own]
     case = case_of(stiffness, *both, f"grains.radius_mm={1e3 * grain}", fine=fine)
-    pull, height = (
-        sphere_mass(fine, density) * GRAVITY,
-        contacts.groove_slope(fine / grain) * grain,
-    )
-    place = [
-        [-grain, 0, 0],
-        [grain, 0, 0],
-        [0, height * math.sin(start), height * math.cos(start)],
-    ]
+    pull = sphere_mass(fine, density) * GRAVITY
+    height = contacts.groove_slope(fine / grain) * grain
+    top = [0, height * math.sin(start), height * math.cos(start)]
+    place = [[-grain, 0, 0], [grain, 0, 0], top]
     box = np.array([[-3 * grain, 3 * grain]] * 2 + [[-3 * grain - 0.02 * GRAVITY, 3 * grain]])
     kinds = np.array([Kind.GRAIN, Kind.GRAIN, Kind.FINE])
     spheres = resting(np.array(place), np.array([grain, grain, fine]), box, kinds)
@@ -592,7 +588,8 @@ def leaving_time(stiffness: float, shear: float, step: float, folder: Path) -> f
     return math.inf
 
 
-def _neck(trial: Trial) -> Seen:
+def neck(trial: Trial) -> Seen:
+    """When the fine leaves the neck with these contacts."""
     stiffness, shear, factor = NECKS[trial.value]
     step = factor * math.sqrt(sphere_mass(2.5e-4, 2500.0) / stiffness) or 1e-6
     return {"leaves after, s": leaving_time(stiffness, shear, step, trial.folder)}
@@ -625,30 +622,7 @@ def draw_clogs(axes: Any, rows: pd.DataFrame) -> None:
     axes.legend(fontsize=8, loc="upper right")
 
 
-CHAPTER = Chapter(
-    comparisons=comparisons_of(
-        Path(__file__).with_suffix(".toml"),
-        {
-            "throat": _throat,
-            "held": _held,
-            "discharge_low": lambda trial: _discharge(trial, 0.1),
-            "discharge_high": lambda trial: _discharge(trial, 0.5),
-            "ergun": _ergun,
-            "free": _free,
-            "slope": _slope,
-            "slope_resisted": lambda trial: _slope(trial, "contact.rolling_friction=0.2"),
-            "collision": _collision,
-            "neck": _neck,
-        },
-        {"held": _judge_held, "low": _judge_low, "high": _judge_high},
-        {
-            "passing_ratio": passing_ratio,
-            "rolling_gain": rolling_gain,
-            "resisted_gain": resisted_gain,
-        },
-    ),
-    panel=draw_clogs,
-)
+CHAPTER = chapter_of(Path(__file__).with_suffix(".toml"), globals(), draw_clogs)
 
 
 def main(arguments: list[str]) -> int:

@@ -175,7 +175,6 @@ def prepare(root: Path) -> Prepared:
         runs.seconds[which] = time.monotonic() - begin
 
     timed("", root / "finished")
-    timed("finished", root / "finished", "--force", "--stages", "analyse")
     timed("pack alone", root / "packed", "--stages", "pack")
     shutil.copytree(root / "packed", root / "unfinished")
     history = root / "unfinished" / "invade" / "history.csv"

@@ -174,7 +174,7 @@ def test_good_inputs_and_some_mutated_ones_make_no_fault(tmp_path):
     plain = Random()
     plain.choice = lambda options: options[-1]
     for kind, (judge, seeds, _) in KINDS.items():
-        for number, data in enumerate(seeds * (" bytes" in kind)):
+        for number, data in enumerate(seeds[-2:] * (" bytes" in kind)):
             (tmp_path / f"{kind} {number}").mkdir()
             good = outcome(judge, data, tmp_path / f"{kind} {number}", plain, kind, limit=120.0)
             assert good == "accepted"

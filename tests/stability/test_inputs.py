@@ -14,6 +14,7 @@ from fdnet.network.network import build_network
 from fdnet.spheres.dump import parse_dump
 from tests.network.packs import random_pack, simple_cubic, snapshot
 
+UNIT = ("--units", "mm", "--box", "0,4,0,4,0,4")
 HOSTILE = ["nan", "NaN", "inf", "-inf", "1e400", "-1e999", "", "1,5", "0x10", "1_0", "none"]
 
 
@@ -38,46 +39,35 @@ def table(path: Path, **swap: str) -> None:
     path.write_text("\n".join([",".join(names), *map(",".join, rows)]) + "\n")
 
 
-@pytest.mark.parametrize("text", HOSTILE)
-@pytest.mark.parametrize("column", ["x", "radius"])
-def test_numbers_that_are_none_in_a_table_are_refused_with_their_line(
-    tmp_path, capsys, column, text
-):
-    table(tmp_path / "s.csv", **{column: text})
-    code, out, err = permeability(
-        capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4"
-    )
-    assert code == 2
-    assert not out
-    assert len(err.splitlines()) == 1
-    assert "s.csv:4" in err
+def test_numbers_that_are_none_in_a_table_are_refused_with_their_line(tmp_path, capsys):
+    for column in ("x", "radius"):
+        for text in HOSTILE:
+            table(tmp_path / "s.csv", **{column: text})
+            code, out, err = permeability(capsys, tmp_path / "s.csv", *UNIT)
+            assert (code, out, len(err.splitlines())) == (2, "", 1), (column, text)
+            assert "s.csv:4" in err
     assert list(tmp_path.iterdir()) == [tmp_path / "s.csv"]
 
 
-@pytest.mark.parametrize("radius", ["1e308", "1e-200", "1e100"])
-def test_radii_beyond_reason_are_refused(tmp_path, capsys, radius):
+def test_radii_beyond_reason_are_refused(tmp_path, capsys):
     """Their cubes are no doubles: overflow where it was not refused."""
-    table(tmp_path / "s.csv", radius=radius)
-    code, out, err = permeability(
-        capsys, tmp_path / "s.csv", "--units", "mm", "--box", "0,4,0,4,0,4"
-    )
-    assert (code, out) == (4, "")
-    assert "check the units" in err
+    for radius in ("1e308", "1e-200", "1e100"):
+        table(tmp_path / "s.csv", radius=radius)
+        code, out, err = permeability(capsys, tmp_path / "s.csv", *UNIT)
+        assert (code, out) == (4, "")
+        assert "check the units" in err
 
 
-@pytest.mark.parametrize(
-    ("place", "periodic", "code"), [("1e308", "", 4), ("1e25", "x", 4), ("1e25", "", 0)]
-)
-def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(
-    tmp_path, capsys, place, periodic, code
-):
+def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(tmp_path, capsys):
     """1e25 periods away no digit of its place is left; next to a wall it is counted as outside."""
-    table(tmp_path / "s.csv", x=place)
-    options = ["--units", "mm", "--box", "0,4,0,4,0,4", "--periodic", periodic, "--json"]
-    ended, out, err = permeability(capsys, tmp_path / "s.csv", *options)
-    assert ended == code, err
-    if code == 0:
-        assert any("1 grains lie outside the box" in one for one in json.loads(out)["warnings"])
+    for place, periodic, code in (("1e308", "", 4), ("1e25", "x", 4), ("1e25", "", 0)):
+        table(tmp_path / "s.csv", x=place)
+        options = [*UNIT, "--periodic", periodic, "--json"]
+        ended, out, err = permeability(capsys, tmp_path / "s.csv", *options)
+        assert ended == code, err
+        if code == 0:
+            warnings = json.loads(out)["warnings"]
+            assert any("1 grains lie outside the box" in one for one in warnings)
 
 
 def frame(*, step="0", count="2", bounds="0 1", rows=("1 1 0.5 ", "2 1 0.25 ")) -> bytes:
@@ -89,34 +79,32 @@ def frame(*, step="0", count="2", bounds="0 1", rows=("1 1 0.5 ", "2 1 0.25 ")) 
     ).encode()
 
 
-@pytest.mark.parametrize(
-    "text", ["nan", "NaN", "inf", "-inf", "1e400", "-nan", "Infinity", "nan(0x1)", "", "1e"]
-)
-def test_numbers_that_are_none_in_a_dump_are_named_with_line_and_column(text):
-    with pytest.raises(DumpError, match=r"d:11: step 0: (column x holds|2 values, expected 3)"):
-        list(parse_dump(frame(rows=("1 1 0.5 ", f"2 1 {text} ")), "d"))
+def test_numbers_that_are_none_in_a_dump_are_named_with_line_and_column():
+    texts = ["nan", "NaN", "inf", "-inf", "1e400", "-nan", "Infinity", "nan(0x1)", "", "1e"]
+    for text in texts:
+        with pytest.raises(
+            DumpError, match=r"d:11: step 0: (column x holds|2 values, expected 3)"
+        ):
+            list(parse_dump(frame(rows=("1 1 0.5 ", f"2 1 {text} ")), "d"))
 
 
-@pytest.mark.parametrize("bounds", ["nan nan", "0 inf", "-inf 1", "1 0", "0 0", "0 1 2", "0", ""])
-def test_bounds_that_bound_nothing_are_refused(bounds):
-    with pytest.raises(
-        DumpError, match=r"d:6: step 0: box bounds .* two numbers, the lower one first"
-    ):
-        list(parse_dump(frame(bounds=bounds), "d"))
+def test_bounds_that_bound_nothing_are_refused():
+    for bounds in ("nan nan", "0 inf", "-inf 1", "1 0", "0 0", "0 1 2", "0", ""):
+        with pytest.raises(
+            DumpError, match=r"d:6: step 0: box bounds .* two numbers, the lower one first"
+        ):
+            list(parse_dump(frame(bounds=bounds), "d"))
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("name", ["position", "radius", "box"])
-def test_a_snapshot_holds_no_number_that_is_none(name, value):
+def test_a_snapshot_holds_no_number_that_is_none(name):
     pack = random_pack(40)
-    fields = {
-        "position": pack.position.copy(),
-        "radius": pack.radius.copy(),
-        "box": pack.box.copy(),
-    }
-    fields[name].flat[1] = value
-    with pytest.raises(CaseError, match=f"{name} holds values that are not finite"):
-        snapshot(**fields)
+    for value in (math.nan, math.inf, -math.inf):
+        names = ("position", "radius", "box")
+        fields = {one: getattr(pack, one).copy() for one in names}
+        fields[name].flat[1] = value
+        with pytest.raises(CaseError, match=f"{name} holds values that are not finite"):
+            snapshot(**fields)
 
 
 def test_a_pack_whose_paths_are_all_closed_is_an_answer_at_the_command_line(tmp_path, capsys):
@@ -124,17 +112,8 @@ def test_a_pack_whose_paths_are_all_closed_is_an_answer_at_the_command_line(tmp_
     place = np.indices((4, 4, 4)).reshape(3, -1).T + 0.5
     rows = "".join(f"{x},{y},{z},0.72\n" for x, y, z in place)
     (tmp_path / "s.csv").write_text("x,y,z,radius\n" + rows)
-    code, out, _ = permeability(
-        capsys,
-        tmp_path / "s.csv",
-        "--units",
-        "mm",
-        "--box",
-        "0,4,0,4,0,4",
-        "--periodic",
-        "xyz",
-        "--json",
-    )
+    options = [*UNIT, "--periodic", "xyz", "--json"]
+    code, out, _ = permeability(capsys, tmp_path / "s.csv", *options)
     result = json.loads(out)
     assert code == 0
     assert result["k_initial_m2"] == result["k_damaged_m2"] == 0

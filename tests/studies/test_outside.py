@@ -3,9 +3,14 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from validation import mechanics, outside
+from fdnet.errors import CaseError
+from fdnet.mechanics.springs import PackMaterial
+from fdnet.report.tables import write_rows
+from fdnet.spheres.snapshot import resting
+from validation import bridging, mechanics, outside
 from validation.comparisons import findings, read_rows, table
 from validation.outside import Clogging, clogging, fitted_line, geometric_chance
 
@@ -88,6 +93,36 @@ def test_the_fines_before_the_wall_touch_nothing():
     assert fines.position[:, 0].max() < -2 * outside.FINE
 
 
+def test_a_column_gives_way_under_the_flow_as_an_even_load_on_springs():
+    """Five grains, six springs k, a force F on each: the middle one moves by 9 F / 2 k."""
+    r = 2.5e-4
+    place = np.column_stack([(2 * np.arange(5) + 1) * r, np.full(5, r), np.full(5, r)])
+    column = resting(place, r, np.array([[0, 10 * r], [0, 2 * r], [0, 2 * r]]))
+    smooth = PackMaterial(normal=3e6, shear=1e-3)
+    moved = mechanics.displacement_under_flow(column, smooth, 1e9, periodic=(False,) * 3)
+    assert moved[2, 0] == pytest.approx(4.5 * 1e9 * 8 * r**3 / 3e6, rel=1e-6)
+
+
+def test_the_closed_throats_of_runs_add_up(tmp_path):
+    """Also where the last class has no upper end."""
+    for number, (throats, closed) in enumerate([(2, 1), (2, 2)]):
+        (tmp_path / f"{number}").mkdir()
+        rows = [
+            bridging.class_row(0.1, 0.2, 0.3, [throats, 0, 0, closed, closed], 3.0),
+            bridging.class_row(0.1, 1.5, math.inf, [1, 0, 0, 1, 1], 1.0),
+        ]
+        write_rows(tmp_path / f"{number}" / "bridging.csv", rows)
+    runs = [str(tmp_path / "0"), str(tmp_path / "1")]
+    command = [*runs, "--csv", str(tmp_path / "all.csv"), "--png", str(tmp_path / "all.png")]
+    assert bridging.main(command) == 0
+    narrow, wide = pd.read_csv(tmp_path / "all.csv").to_dict("records")
+    assert (narrow["throats"], narrow["closed"], narrow["arrived_mean"]) == (4, 3, 1.5)
+    assert narrow["share_low"] < 0.75 < narrow["share_high"]
+    assert (wide["throats"], wide["closed"], wide["ratio_lo"]) == (2, 2, 1.5)
+    with pytest.raises(CaseError, match="is missing"):
+        bridging.main([str(tmp_path), "--csv", str(tmp_path / "none.csv")])
+
+
 @pytest.mark.liggghts
 @pytest.mark.parametrize("overlap", [0.0, 0.03, 0.05])
 def test_fines_pass_the_throat_of_three_grains_up_to_half_a_percent(overlap, tmp_path):
@@ -122,7 +157,8 @@ def test_a_quick_form_agrees_and_gives_the_committed_numbers(chapter, name, root
     assert all(one.verdict == "agrees" for one in findings(chapter.CHAPTER.comparisons, rows))
     keys = ["comparison", "value", "seed", "quantity"]
     known = read_rows(root / "docs" / "validation" / f"{own}.csv")
-    both = rows.merge(known, on=keys, suffixes=("", "_known"))
+    texts = [one.assign(value=one.value.astype(str)) for one in (rows, known)]
+    both = texts[0].merge(texts[1], on=keys, suffixes=("", "_known"))
     if "loose pack" not in name and "constriction" not in name:
         assert len(both) == len(rows)
         apart = (both.observed - both.observed_known).abs()
