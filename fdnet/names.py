@@ -21,10 +21,11 @@ SECTION_ARCHIE: DamageLawName = "section-archie"
 MOST_SPHERES = 300_000
 """Grains and fines up to which "auto" takes `all-spheres`.
 
-So many take 260 s of one core and 2.1 GB in eight sections (docs/benchmark_spheres.csv).
+So many take 260 s of one core and 2.1 GB in eight sections
+(docs/validation/benchmark_spheres.csv).
 """
 THESIS_LAWS = ("thesis", "thesis-code")
-"""Laws that are off by factors (docs/accuracy.md): kept to compare with the thesis."""
+"""Laws that are off by factors (docs/evidence/accuracy.md): kept to compare with the thesis."""
 MOST_SECTIONS = 1000
 REMOVED_LAWS = {
     "hydraulic": DEFAULT_LAW,

@@ -104,10 +104,3 @@ def test_sections_in_place_recombine_in_series(run, small):
             k = [row[f"k_{name}_inplace_m2"] for row in rows]
             series = sum(dx / one for dx, one in zip(thickness, k, strict=True))
             assert sum(thickness) / series == pytest.approx(result[f"k_{name}_m2"], rel=1e-9)
-
-
-def test_sections_are_printed_with_their_units(small, tmp_path, capsys):
-    assert main(command(tmp_path / "pack.csv", small, "--sections", "3", "--periodic", "")) == 0
-    said = capsys.readouterr().out
-    assert "from m" in said
-    assert len([row for row in said.splitlines() if row.startswith(" ")]) == 4

@@ -115,7 +115,7 @@ def test_the_readme_is_short(root):
     "page",
     [
         "README.md",
-        "docs/accuracy.md",
+        "docs/evidence/accuracy.md",
     ],
 )
 def test_the_accuracy_of_intact_packs_is_that_of_its_table(root, page):

@@ -294,7 +294,7 @@ def measure_all_spheres(spheres: Snapshot, edges: Array, *, sides: Sides, log: L
 
 FEW_THROATS = 100
 """Number of throats that carry the flow of a section (`Flow.carrying_throats`) below which its
-permeability with fines is off by 5 % (rms), above which by 2 % (docs/accuracy.md)."""
+permeability with fines is off by 5 % (rms), above which by 2 % (docs/evidence/accuracy.md)."""
 
 
 def at_most_the_grains(

@@ -1,7 +1,7 @@
 """Resolved Stokes flow around spheres on a staggered grid.
 
 It is the reference of the pore network (`solve_stokes`, `solve_slab`) and, on coarser grids, the
-flow that `fdnet.network.field` interpolates. Method and checks: docs/stokes.md.
+flow that `fdnet.network.field` interpolates. Method and checks: docs/theory/resolved_flow.md.
 """
 
 import logging
@@ -112,7 +112,7 @@ def divide(edges: Array, cells: int) -> Shape:
 #
 #     p = sum_e(conj(g_e) f_e) / lambda,        u_d = (f_d - g_d p) / lambda,        means 0
 #
-# The transforms and the g_d of each pair of sides stand in docs/stokes.md.
+# The transforms and the g_d of each pair of sides stand in docs/theory/resolved_flow.md.
 
 
 class Response:
@@ -236,9 +236,9 @@ def _respond(
 
 
 # ------------------------------------------------------------------------------------------------
-# Which nodes of the grid hold a wall, how far the walls stand, and whose they are (docs/stokes.md,
-# 1 and 6). Beyond a plane of one pressure lies the mirror image of what is before it. Lengths are
-# in the spacing along x.
+# Which nodes of the grid hold a wall, how far the walls stand, and whose they are
+# (docs/theory/resolved_flow.md, 1 and 6). Beyond a plane of one pressure lies the mirror image of
+# what is before it. Lengths are in the spacing along x.
 
 
 SIDE_WALL = -2
@@ -381,11 +381,12 @@ def _mark(
 
 
 # ------------------------------------------------------------------------------------------------
-# The preconditioner of the wall forces: G - share G Z F Z' G (docs/stokes.md, 5). G are the
-# seven-point differences of the forces at the wall nodes, Z spreads three smooth fields on these
-# nodes, and F = exp(-|q|2 reach2) for the wave number q is the low-pass filter of fields without
-# divergence. Z is scaled by the smoothed density of the walls, so that Z' G Z is about 1. The
-# fields live on cells of half the reach, where all this costs little.
+# The preconditioner of the wall forces: G - share G Z F Z' G
+# (docs/theory/resolved_flow.md, 5). G are the seven-point differences of the forces at the wall
+# nodes, Z spreads three smooth fields on these nodes, and F = exp(-|q|2 reach2) for the wave
+# number q is the low-pass filter of fields without divergence. Z is scaled by the smoothed density
+# of the walls, so that Z' G Z is about 1. The fields live on cells of half the reach, where all
+# this costs little.
 
 
 OWN_RESPONSE = 2.0 / 3.0 * 0.252731
@@ -576,11 +577,11 @@ def _add_products(one: Array, other: Array, columns: Array) -> None:
 
 # ------------------------------------------------------------------------------------------------
 # The forces that hold the fluid at the walls, by conjugate gradients: S F + D F + U = 0 at every
-# wall node, with the slack D of the walls and the superficial velocity U (docs/stokes.md, 2 to 4).
-# U is 1 along x. Along periodic sides the fluid may drift: the forces add up to 0 there, and that
-# component of U is the multiplier. Numbers at the nodes lie on whole arrays of single precision,
-# 0 where there is no wall: some half of all nodes feel one, so whole rows are passed over faster
-# than a list of those nodes and of their neighbours.
+# wall node, with the slack D of the walls and the superficial velocity U
+# (docs/theory/resolved_flow.md, 2 to 4). U is 1 along x. Along periodic sides the fluid may drift:
+# the forces add up to 0 there, and that component of U is the multiplier. Numbers at the nodes lie
+# on whole arrays of single precision, 0 where there is no wall: some half of all nodes feel one,
+# so whole rows are passed over faster than a list of those nodes and of their neighbours.
 
 
 MOST_ITERATIONS = 6000
@@ -954,9 +955,9 @@ def estimate(coarse: StokesFlow, fine: StokesFlow, *, with_fines: bool) -> Estim
     """The permeability at zero spacing, from grids whose cells are 1.5 times apart.
 
     On packs without fines the extrapolation of second order is within 0.3 % (rms;
-    docs/stokes.md). Between fines in contact the fluid is thinner than a cell, so on the grids
-    that can be afforded a deposit converges with orders of 1.3 to 2. Its permeability is the mean
-    of the extrapolations of order 1.5 and 2, and its error is their difference.
+    docs/theory/resolved_flow.md). Between fines in contact the fluid is thinner than a cell, so on
+    the grids that can be afforded a deposit converges with orders of 1.3 to 2. Its permeability is
+    the mean of the extrapolations of order 1.5 and 2, and its error is their difference.
 
     Raises:
         CaseError: as `extrapolate` does.

@@ -90,7 +90,7 @@ LEAK = 1e-6
 what the fines close."""
 CELLS, SLIP = 10.0, 0.15
 """Cells of the resolved field across a grain (docs/evidence/error_against_time.md), and the rms
-velocity over the superficial one that it leaves at the walls (docs/velocity_field.md)."""
+velocity over the superficial one that it leaves at the walls (docs/theory/resolved_flow.md)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -38,7 +38,7 @@ MOST_CELLS = 60_000_000
 BYTES = 200
 """Memory for each cell."""
 SECONDS = {"initial": 1.2e-5, "damaged": 2.5e-5}
-"""For each cell, on one core of the machine of docs/stokes.md."""
+"""For each cell, on one core."""
 KEPT_IN, GRIDS, RESOLVED = "stokes", "grids.json", "sections.csv"
 """Folder in the run folder, the file of the solved grids, the table of the sections."""
 Follow = Callable[[str], None]

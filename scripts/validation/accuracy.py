@@ -7,7 +7,7 @@ damage law "auto" is meant, the rows are those of "all-spheres", which it takes 
 """
 
 import argparse
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from fdnet.files import path_option, replacing
 from fdnet.names import ALL_SPHERES, DEFAULT_LAW, SECTION_ARCHIE
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.sections import Section, whole_permeability
+from fdnet.network.flow.sections import whole_permeability
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.permeability import compare
@@ -41,7 +41,7 @@ PACKS, SLABS, FIGURE = "accuracy_packs.csv", "accuracy_slabs.csv", "accuracy.png
 SECTIONS = "stokes_sections.csv"
 THROATS = "throats"
 """Number of throats that carry the flow through grains and fines (`Flow.carrying_throats`)."""
-FINE_CLASSES = {"3 to 4": (0.0, 4.5), "5 to 6": (4.5, 7.0), "8 to 10": (7.0, np.inf)}
+SIZES = {"3 to 4": (0.0, 4.5), "5 to 6": (4.5, 7.0), "8 to 10": (7.0, np.inf)}
 """Size ratio D/d, the mean radius of the grains over that of the fines."""
 LIGHT = 0.9
 """k/k0 from which on the damage of a slab is light."""
@@ -129,42 +129,37 @@ def slab_row(slab: Slab) -> Row:
         "known_before": slab.known_before,
         "k_over_k0": slab.ratio,
     }
-    for pair, section in zip(ALL_PAIRS, _sections(spheres, slab.planes), strict=True):
+    edges = np.unique([*spheres.box[0], *slab.planes]).tolist()
+    laws = [(law, damage) for law, damage in (pair.split(" + ") for pair in ALL_PAIRS)]
+    results = compare(spheres, periodic="yz", sections=edges, laws=laws)
+    for pair, result in zip(ALL_PAIRS, results, strict=True):
+        section = next(one for one in result.sections if one.x_lo == slab.planes[0])
         row[f"{law_of(pair)}: k0"] = section.k_initial / slab.k0
         row[f"{pair}: k"] = section.k_damaged / slab.k
         row[pair] = section.k_damaged / section.k_initial / slab.ratio
     return row
 
 
-def _sections(spheres: Snapshot, planes: tuple[float, float]) -> Iterator[Section]:
-    """The section between the planes by each of `ALL_PAIRS`."""
-    edges = np.unique([*spheres.box[0], *planes]).tolist()
-    pairs = [(law, damage) for law, damage in (pair.split(" + ") for pair in ALL_PAIRS)]
-    for result in compare(spheres, periodic="yz", sections=edges, laws=pairs):
-        yield next(section for section in result.sections if section.x_lo == planes[0])
-
-
 def tables(folder: Path) -> str:
     """The tables of docs/evidence/accuracy.md in Markdown, from the written files."""
     packs, cut = pd.read_csv(folder / PACKS), pd.read_csv(folder / SLABS)
     ratio, many = cut["size_ratio"], cut[THROATS] >= FEW_THROATS
-    some = {name: (low <= ratio) & (ratio < high) for name, (low, high) in FINE_CLASSES.items()}
-    some |= {"all": ratio > 0, "put aside": cut["known_before"] == truth.LATER}
-    classes = {}
-    for name, among in some.items():
+    classes = {name: cut[(low <= ratio) & (ratio < high)] for name, (low, high) in SIZES.items()}
+    for name, among in (("all", ratio > 0), ("put aside", cut["known_before"] == truth.LATER)):
         classes[f"{name}; {FEW_THROATS} throats or more"] = cut[among & many]
         classes[f"{name}; fewer"] = cut[among & ~many]
-    classes[f"all; k/k0 above {LIGHT:g}"] = cut[cut["k_over_k0"] > LIGHT]
-    named = {pair: pair for pair in ALL_PAIRS if pair != PAIRS[1]}
-    k = {f"{FINEST}: k": "k itself, all-spheres"}
+    classes[f"k/k0 above {LIGHT:g}"] = cut[cut["k_over_k0"] > LIGHT]
+    laws = {PAIRS[0]: "thesis", ARCHIE: SECTION_ARCHIE, FINEST: ALL_SPHERES}
+    k = {f"{FINEST}: k": f"k, {ALL_SPHERES}"}
+    slab_columns = laws | k | {f"{DEFAULT_LAW}: k0": "k0"}
     intact, filled = packs[packs["fines"] == 0], packs[packs["fines"] > 0]
     kinds = {name: intact[intact["group"] == name] for name in truth.GROUPS}
-    sizes = {f"{size:.0f}": of for size, of in filled.groupby(filled["size_ratio"].round())}
+    filled_by = {f"{size:.0f}": of for size, of in filled.groupby(filled["size_ratio"].round())}
     return "\n\n".join(
         [
-            _table("D/d", classes, named | k | {f"{DEFAULT_LAW}: k0": f"k0, {DEFAULT_LAW}"}),
+            _table("D/d", classes, slab_columns),
             _table("grains alone", kinds, {f"{law}: k0": law for law in LAWS}),
-            _table("D/d", sizes, {pair: pair for pair in ALL_PAIRS} | k),
+            _table("D/d", filled_by, laws | k),
         ]
     )
 
@@ -196,16 +191,16 @@ def draw(folder: Path) -> None:
     import matplotlib.pyplot as plt
 
     cut = pd.read_csv(folder / SLABS)
-    figure, panels = plt.subplots(1, 2, figsize=(11, 4.8), sharey=True, constrained_layout=True)
+    figure, panels = plt.subplots(2, 1, figsize=(6.4, 7.2), constrained_layout=True)
     for axes, against in zip(panels, ("k_over_k0", THROATS), strict=True):
         for pair, colour, marker in ((ARCHIE, "#D55E00", "s"), (FINEST, "#0072B2", "o")):
-            error = 100.0 * (cut[pair] - 1.0)
-            axes.plot(cut[against], error, marker, ms=4, color=colour, alpha=0.7, label=pair)
+            error, law = 100.0 * (cut[pair] - 1.0), pair.split(" + ")[1]
+            axes.plot(cut[against], error, marker, ms=4, color=colour, alpha=0.7, label=law)
         axes.axhline(0.0, color="#1A1A1A", lw=0.8)
-        axes.set_xscale("log")
+        axes.set(xscale="log", ylabel="error of k/k0, %")
         axes.grid(lw=0.3)
     panels[1].axvline(FEW_THROATS, color="#1A1A1A", lw=0.8, ls=":")
-    panels[0].set(xlabel="k/k0 by resolved flow", ylabel="error of k/k0, %")
+    panels[0].set(xlabel="k/k0 by resolved flow")
     panels[1].set(xlabel="throats that carry the flow")
     panels[0].legend()
     with replacing(folder / FIGURE) as part:

@@ -7,7 +7,8 @@ solved by `fdnet.network.stokes` on several grids and extrapolated to zero spaci
 """
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,18 +22,16 @@ from fdnet.case.case import Case
 from fdnet.case.file import case_from
 from fdnet.errors import CaseError
 from fdnet.files import path_option
-from fdnet.network import stokes
-from fdnet.network.stokes import Estimate, StokesFlow, extrapolate
+from fdnet.network.stokes import Estimate, solve_slab, solve_stokes
 from fdnet.run.pipeline import run_case
 from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 from validation import truth
 from validation.truth import DEPOSIT, GRAINS, MM, RADIUS, read_pack, read_table
 
-BRIDGE_SHARE = 0.3
-"""Share of the fines that touch three spheres."""
-REFUSALS = 1000
-"""So many refused places in a row, and the remaining fines go to the void."""
+BRIDGE_SHARE, REFUSALS = 0.3, 1000
+"""Share of the fines that touch three spheres; and after so many refused places in a row the
+remaining fines go to the void."""
 
 # Packs, in mm.
 
@@ -187,32 +186,26 @@ def touching_three(corner: Array, reach: Array, rng: np.random.Generator) -> Arr
 # Specimens, which LIGGGHTS makes.
 
 UNIFORM = {"upstream": "interstitial", "pressure_gradient": False}
-FOLLOWED = {
-    "field": "network",
-    "update_travel": 0.5,
-    "upstream": "darcy",
-    "crowd": "beetstra",
-    "pressure_gradient": True,
-    "scheme": "implicit",
-}
+FOLLOWED = {"field": "network", "update_travel": 0.5, "upstream": "darcy", "crowd": "beetstra"}
+FOLLOWED |= {"pressure_gradient": True, "scheme": "implicit"}
 """The flow follows the deposit; the contacts are ten times as stiff for its larger forces."""
 
 
 def case_of(name: str) -> Case:
     """The case of a stored specimen, with the default of every key that is not named here."""
     row = next(row for row in read_table("specimens") if row["name"] == name)
-    followed = row["followed"] == truth.YES
-    grains: dict[str, Any] = {"count": int(row["grains"])} if row["grains"] else {}
-    grains = grains or {"porosity": float(row["porosity"])}
-    fines = {"count": int(row["supplied"]), "supply": "slab", "friction": float(row["friction"])}
+    followed, friction = row["followed"] == truth.YES, float(row["friction"])
+    grains, fines = (
+        {"radius_mm": _radius(row[key]), "friction": friction} for key in ("grain_mm", "fine_mm")
+    )
+    pack = {"count": int(row["grains"])} if row["grains"] else {"porosity": float(row["porosity"])}
     return case_from(
         {
             "name": name,
             "seed": int(row["seed"]),
             "box": {"size_mm": [2.5, 1.2, 1.2], "sides": "periodic", "wall_friction": 0.0},
-            "grains": grains
-            | {"radius_mm": _radius(row["grain_mm"]), "friction": float(row["friction"])},
-            "fines": fines | {"radius_mm": _radius(row["fine_mm"])},
+            "grains": grains | pack,
+            "fines": fines | {"count": int(row["supplied"]), "supply": "slab"},
             "fluid": {"darcy_length_mm": 8.0},
             "drag": FOLLOWED if followed else UNIFORM,
             "run": {"time_step_factor": 0.1} | ({"stiffness_N_m": 1e5} if followed else {}),
@@ -243,70 +236,59 @@ def made_anew(name: str, runs: Path) -> float:
 
 SLAB_TOLERANCE = 5e-4
 """Of the solves of slabs: k ends 2.2e-4 too high."""
-SAFETY = 2.0
 
 
-def limit(flows: Sequence[StokesFlow]) -> Estimate:
-    """The permeability at zero spacing from two grids or more of one cell.
+def limit(grids: Mapping[int, float]) -> Estimate:
+    """The permeability at zero spacing from k (m2) by the number of cells, two grids or more.
 
     It is where k0 + C h^2, fitted to the three finest grids by least squares, meets h = 0. The
-    error is `SAFETY` times the largest change of k when one of these grids is left out, and at
-    least twice the tolerance of the solves. Two grids are extrapolated as by Richardson.
+    error is twice the largest change of k when one of these grids is left out, and at least twice
+    the tolerance of the solves; of two grids it is a third of the step of the extrapolation.
     """
-    grids = sorted(flows, key=lambda flow: flow.cells)[-3:]
-    if len(grids) < 3:
-        return extrapolate(*grids)
-    best = float(
-        np.polyfit([flow.cells**-2.0 for flow in grids], [flow.k for flow in grids], 1)[1]
-    )
-    change = max(abs(extrapolate(*pair).k - best) for pair in combinations(grids, 2))
-    return Estimate(k=best, error=max(SAFETY * change / best, 2.0 * SLAB_TOLERANCE))
+    finest = sorted(grids.items())[-3:]
+    pairs = combinations(finest, 2)
+    ends = [fine + (fine - coarse) / ((n / m) ** 2 - 1.0) for (m, coarse), (n, fine) in pairs]
+    if len(finest) == 2:
+        return Estimate(k=ends[0], error=abs(1.0 - finest[1][1] / ends[0]) / 3.0)
+    cells, k = np.array(finest).T
+    best = float(np.polyfit(cells**-2.0, k, 1)[1])
+    change = max(abs(end - best) for end in ends)
+    return Estimate(k=best, error=max(2.0 * change / best, 2.0 * SLAB_TOLERANCE))
 
 
-def stored_grids(name: str, solid: str = "") -> list[StokesFlow]:
-    """The solved grids of a pack (along x), or of a slab's `GRAINS` or `DEPOSIT`, k in m2."""
+def stored_grids(name: str, solid: str = "") -> dict[int, float]:
+    """k (m2) by cells of a pack (along x), or of a slab's `GRAINS` or `DEPOSIT`."""
     table, key = ("slab_grids", "slab") if solid else ("pack_grids", "case")
-    return [
-        StokesFlow(
-            k=float(row["k_mm2"]) * MM**2,
-            residual=float(row["slip"]),
-            seconds=float(row["seconds"]),
-            **{key: int(row[key]) for key in ("iterations", "cells", "unknowns")},
-        )
+    return {
+        int(row["cells"]): float(row["k_mm2"]) * MM**2
         for row in read_table(table)
-        if row[key] == name and row.get("solid", "") == solid and row.get("axis", "x") == "x"
-    ]
+        if (row[key], row.get("solid", ""), row.get("axis", "x")) == (name, solid, "x")
+    }
 
 
-def solved_anew(name: str, *, quick: bool = False) -> Iterator[dict[str, object]]:
+def solved_anew(name: str, *, quick: bool = False) -> Iterator[dict[str, Any]]:
     """The three finest stored grids of a pack or slab, or its coarsest, solved anew.
 
     The rows hold the share by which k differs from the stored one, also at the limit.
     """
     slab = next(truth.slabs([name]), None)
     for solid in (GRAINS, DEPOSIT) if slab else ("",):
-        stored = sorted(stored_grids(name, solid), key=lambda flow: flow.cells)
+        stored = sorted(stored_grids(name, solid).items())
         if not stored:
             raise CaseError(f"truth: {name} is no slab or pack with stored grids")
-        kept = stored[:1] if quick else stored[-3:]
+        kept = dict(stored[:1] if quick else stored[-3:])
         spheres = read_pack(slab.specimen if slab else name)
         spheres = spheres.grains() if solid == GRAINS else spheres
-        flows = []
-        for old in kept:
-            new = (
-                stokes.solve_slab(spheres, slab.planes, cells=old.cells, tolerance=SLAB_TOLERANCE)
-                if slab
-                else stokes.solve_stokes(spheres, cells=old.cells)
-            )
-            flows.append(new)
-            yield {"name": name, "solid": solid, "cells": old.cells} | _against(new.k, old.k)
+        solve = partial(solve_stokes, spheres)
+        if slab:
+            solve = partial(solve_slab, spheres, slab.planes, tolerance=SLAB_TOLERANCE)
+        new = {cells: solve(cells=cells).k for cells in kept}
+        rows = [(str(cells), new[cells], kept[cells]) for cells in kept]
         if not quick:
-            ends = limit(flows).k, limit(kept).k
-            yield {"name": name, "solid": solid, "cells": "limit"} | _against(*ends)
-
-
-def _against(k: float, stored: float) -> dict[str, object]:
-    return {"k_m2": k, "difference": k / stored - 1.0}
+            rows.append(("limit", limit(new).k, limit(kept).k))
+        for cells, k, old in rows:
+            row: dict[str, Any] = {"name": name, "solid": solid, "cells": cells, "k_m2": k}
+            yield row | {"difference": k / old - 1.0}
 
 
 # Tables.

@@ -84,15 +84,6 @@ def test_zick_and_homsy_cut_at_planes_of_symmetry(x_lo, x_hi):
     assert k == pytest.approx(zick_and_homsy(np.pi / 6, 42.1, 0.5), rel=0.005)
 
 
-@pytest.mark.nightly
-def test_second_order():
-    pack = cell(SC, (0.45 * 3 / 4 / np.pi) ** (1 / 3))
-    exact = zick_and_homsy(0.45, 28.09, pack.radius[0])
-    error = [solve_stokes(pack, cells=n).k / exact - 1.0 for n in (16, 32, 64)]
-    order = np.log2(np.array(error[:-1]) / error[1:])
-    assert np.all((order > 1.7) & (order < 2.4)), order
-
-
 def test_a_direct_solve_gives_the_same_tensor():
     rng = np.random.default_rng(5)
     edges = np.array([1.0, 0.8, 0.9])

@@ -2,7 +2,7 @@
 
 The velocity of the fluid in the pores of a pack, with a deposit of fines or without: a coarse
 resolved Stokes flow (`fdnet.network.stokes`), interpolated down to the walls (`sampled`). Formulas
-and checks: docs/velocity_field.md.
+and checks: docs/theory/resolved_flow.md.
 """
 
 from dataclasses import dataclass

@@ -3,8 +3,8 @@
 The nodes carry velocity / phi, with the profile phi that the walls allow; it is interpolated
 linearly and multiplied by phi at the point. Nearer than PROBED_AT to a sphere it is taken at that
 distance on the same normal, and the part across the wall follows from the divergence of the part
-along it (docs/velocity_field.md). Nodes in the solid, or of a phi below LEAST_PROFILE, take the
-mean of their neighbours; in the solid, without its part across the wall. Lengths are in the
+along it (docs/theory/resolved_flow.md). Nodes in the solid, or of a phi below LEAST_PROFILE, take
+the mean of their neighbours; in the solid, without its part across the wall. Lengths are in the
 spacing along x, from the lower corner of the grid.
 """
 

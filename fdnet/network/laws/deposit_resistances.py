@@ -592,7 +592,7 @@ def _meet(local: Array, count: int, base: Array, radius: Array, z: float, room: 
 #
 # where that is positive. a is the radius of the round tube that carries as much as the section at
 # the node, and < > the mean over the throats of the pore, weighted with their conductances. The
-# number 0.6 is fitted to resolved flow (docs/accuracy.md).
+# number 0.6 is fitted to resolved flow (docs/evidence/accuracy.md).
 
 
 SPREAD = 0.6
