@@ -94,8 +94,8 @@ def test_a_state_is_kept_to_a_nanometre_and_a_wrong_one_refused(state, tmp_path)
 
 
 def test_every_number_told_has_its_source():
-    told = (*published()["statistic"], *published()["deposition"])
-    assert all(one["source"].startswith(("Figure", "Table", "section")) for one in told)
+    numbers = (*published()["statistic"], *published()["deposition"])
+    assert all(one["source"].startswith(("Figure", "Table", "section")) for one in numbers)
     assert reductions(thesis_of("specimen5-5to6"))[:3] == [0.32, 0.047, 0.078]
     names = ("quick-specimen5", "specimen1 fines.friction=0", "table3", "specimen10", "quick")
     assert [specimen_of(one) for one in names] == ["specimen5", "specimen1", "table3", "", ""]
@@ -147,8 +147,8 @@ def test_fines_in_throats_and_bodies(run):
         "overall pore-body porosity": 1 - bodies / (16 * (A**3 - ball(R))),
         "mean porosity of throats with fines": 1 - throats / (8 * pi * TUBE**2 * A),
     }
-    found = {name: q.measure(section, name, None)[0] for name in q.SINGLES}
-    assert found == pytest.approx(expected)
+    measured = {name: q.measure(section, name, None)[0] for name in q.SINGLES}
+    assert measured == pytest.approx(expected)
 
 
 def test_deposition_by_throat_porosity(run):

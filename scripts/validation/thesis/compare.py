@@ -58,7 +58,7 @@ def values_in(rows: Table, quantity: str) -> Table:
     return rows.eval(QUANTITIES[quantity].values).astype(float)
 
 
-def told(run: str, quantity: str) -> str:
+def reported(run: str, quantity: str) -> str:
     """The thesis's number of a quantity in its unit, as text; "" where it has none."""
     name, scale = QUANTITIES[quantity].thesis, float(QUANTITIES[quantity].scale)
     one = thesis_of(run)
@@ -167,7 +167,7 @@ def _cells(rows: Table, run: str, names: Sequence[str]) -> Iterator[tuple[Any, .
     for name in names:
         if name in QUANTITIES:
             one = QUANTITIES[name]
-            yield name, told(run, name), values_in(rows, name), one.unit, one.by_law
+            yield name, reported(run, name), values_in(rows, name), one.unit, one.by_law
             continue
         for number in range(1, SECTIONS + 1):
             column = f"{name}_{number}"

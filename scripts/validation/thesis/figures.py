@@ -101,8 +101,10 @@ def _finish(figure: Any, panel: Any, lines: Sequence[str] = (), *, columns: int 
     of = f", specimen{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}" if numbers else ""
     head = f"Figure {panel.figure}{of}: {panel.text}" if panel.figure[0].isdigit() else panel.text
     figure.suptitle("\n".join([head, *lines]), fontsize=9, x=0.02, ha="left")
-    found = [axes.get_legend_handles_labels() for axes in figure.axes]
-    once = {name: line for lines, names in found for line, name in zip(lines, names, strict=True)}
+    entries = [axes.get_legend_handles_labels() for axes in figure.axes]
+    once = {
+        name: line for lines, names in entries for line, name in zip(lines, names, strict=True)
+    }
     if once:
         place = {"loc": "outside lower center", "ncols": columns, "fontsize": 9}
         figure.legend([*once.values()], [*once], **place)
@@ -290,12 +292,12 @@ def _scan(figure: Any, panel: Any, sources: Sources) -> None:
             seeds = {one.seed for one in plan if one.name == case}
             rows = sources.results[sources.results.seed.isin(seeds)]
             ids = {float(one.value): one.id for one in plan if one.name == case}
-            found = {x: values_of(rows, ids[x], name) for x in sorted(ids)}
-            found = {x: values for x, values in found.items() if len(values)}
+            curve = {x: values_of(rows, ids[x], name) for x in sorted(ids)}
+            curve = {x: values for x, values in curve.items() if len(values)}
             colour = COLOURS[int(specimen_of(case)[-1])]
-            low, mean, high = ([f(one) for one in found.values()] for f in (min, np.mean, max))
-            axes.plot([*found], mean, "o-", color=colour, label=case)
-            axes.fill_between([*found], low, high, color=colour, alpha=0.2, linewidth=0)
+            low, mean, high = ([f(one) for one in curve.values()] for f in (min, np.mean, max))
+            axes.plot([*curve], mean, "o-", color=colour, label=case)
+            axes.fill_between([*curve], low, high, color=colour, alpha=0.2, linewidth=0)
         if name == "deepest fine":
             deep = thesis_of("table3")["invaded_depth_mm"]
             axes.plot(1.0, deep, label="thesis, Table 3", **MARK)

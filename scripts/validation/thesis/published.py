@@ -69,5 +69,5 @@ def key_of(statistic: Mapping[str, Any]) -> tuple[str, Between]:
 
 def in_words(sense: str, value: float, scale: float = 1.0) -> str:
     """A number of the thesis, such as "about 70"; "" before an exact one."""
-    told = f"{round(scale * value, 6):.6g}"
-    return told if sense in ("", "exact") else f"{sense} {told}"
+    reported = f"{round(scale * value, 6):.6g}"
+    return reported if sense in ("", "exact") else f"{sense} {reported}"

@@ -87,12 +87,12 @@ def deep_near_wall(run: Run) -> float:
 def _told(name: str) -> Callable[[Run, Analysis], float]:
     """A number of the thesis; its counts only for specimens of its size."""
 
-    def told(run: Run, _: Analysis) -> float:
+    def reported(run: Run, _: Analysis) -> float:
         value = thesis_of(run.item.id).get(name, math.nan)
         quick = "count" in name and run.item.group == "quick"
         return math.nan if quick else float(value[0] if isinstance(value, list) else value)
 
-    return told
+    return reported
 
 
 RUN: Mapping[str, Callable[[Run, Analysis], Any]] = {
@@ -364,8 +364,8 @@ def fines_in_class(section: Section, between: tuple[float, float]) -> Mapping[st
     chosen = within(fines.throat_porosity, between) & (weight > 0)
     use = chosen[fines.pair_throat]
     throat = fines.pair_throat[use]
-    found = {"distance": fines.pair_distance[use], "volume": fines.pair_volume[use]}
-    return found | {"weight": weight[throat], "throat": throat}
+    pairs = {"distance": fines.pair_distance[use], "volume": fines.pair_volume[use]}
+    return pairs | {"weight": weight[throat], "throat": throat}
 
 
 def deposition(run: Run) -> Iterator[dict[str, Any]]:
@@ -377,7 +377,7 @@ def deposition(run: Run) -> Iterator[dict[str, Any]]:
     """
     section = first_section(run, WHOLE)
     for claim in published()["deposition"]:
-        told = claim if run.item.name.startswith("specimen5") else {}
+        reported = claim if run.item.name.startswith("specimen5") else {}
         fines = fines_in_class(section, claim["throat_porosity"])
         near, far = fines["distance"] < 0.5, fines["distance"] > 1.0
         parts = {"nearer_axis": near, "nearer_wall": ~near & ~far, "beyond_wall": far}
@@ -400,9 +400,9 @@ def deposition(run: Run) -> Iterator[dict[str, Any]]:
             "wall_high": high,
             "law": "" if not total else DEPOSITION if wall > 0.5 else CLOGGING,
             "decided": low > 0.5 or high < 0.5,
-            "nearer": told.get("nearer", ""),
-            "thesis": told.get("value", math.nan),
-            "sense": told.get("sense", ""),
+            "nearer": reported.get("nearer", ""),
+            "thesis": reported.get("value", math.nan),
+            "sense": reported.get("sense", ""),
             "source": claim["source"],
         }
 
