@@ -36,6 +36,7 @@ def order_of(results: dict, name: str, by: str = "steps") -> float:
     return -float(np.polyfit(np.log(where), np.log(errors), 1)[0])
 
 
+@pytest.mark.nightly
 @pytest.mark.liggghts
 def test_overlap_falls_as_the_root_of_the_stiffness_up_to_the_nominal_value(tmp_path):
     """v sqrt(m_eff / k) exp(...) of a damped spring; restitution does not depend on it."""
@@ -49,6 +50,7 @@ def test_overlap_falls_as_the_root_of_the_stiffness_up_to_the_nominal_value(tmp_
         assert one["restitution_error"] == pytest.approx(-0.0085, abs=5e-4)
 
 
+@pytest.mark.nightly
 @pytest.mark.liggghts
 def test_collisions_packs_and_drag_converge_in_their_orders(tmp_path):
     worst = measured(tmp_path, (0.4, 0.2, 0.1, 0.05), system="four collisions")
@@ -59,6 +61,7 @@ def test_collisions_packs_and_drag_converge_in_their_orders(tmp_path):
     assert pack[0.1]["energy_drift"] < 1e-4
 
 
+@pytest.mark.nightly
 @pytest.mark.liggghts
 def test_schemes_of_drag_have_the_errors_of_their_closed_forms(tmp_path):
     """After n = tau/h intervals h: ((2-h)/(2+h))^n implicit, (1-h)^n else, against exp(-1)."""
@@ -109,6 +112,7 @@ def test_eighty_digits_are_the_rational_answer():
         assert fluxes == pytest.approx(exact, rel=1e-14, abs=1e-30 * np.abs(exact).max())
 
 
+@pytest.mark.nightly
 def test_solvers_are_as_near_to_eighty_digits_as_their_tolerance_and_rounding(tmp_path):
     for decades, bound in ((0, 1e-10), (8, 1e-9), (16, 1e-6)):
         network = {"measure": linear_solver.measure, "pores": 200, "decades": decades, "seed": 0}
@@ -138,6 +142,7 @@ def test_a_chain_carries_its_series_conductance_and_steps_may_run_out(tmp_path, 
         solve_by("CG + Jacobi", circuit_of(200, 8.0, 0, tmp_path), 1e-12)
 
 
+@pytest.mark.nightly
 def test_errors_of_the_velocity_fall_with_the_cells_and_points_lie_in_the_pores(tmp_path):
     pack = {"measure": velocity_field.measure, "pack": "C, porosity 0.40", "fine": 12.0}
     result = measured(tmp_path, (5.0, 7.0), **pack)
@@ -148,6 +153,7 @@ def test_errors_of_the_velocity_fall_with_the_cells_and_points_lie_in_the_pores(
     assert len(place) / 4000 == pytest.approx(1.0 - 0.216, abs=0.02)  # 3 sigma
 
 
+@pytest.mark.nightly
 def test_laws_have_the_errors_of_the_table_of_accuracy_and_resolved_flow_converges(root, tmp_path):
     with (root / "docs/validation/accuracy_packs.csv").open(newline="") as file:
         known = {row["case"]: row for row in csv.DictReader(file)}
