@@ -57,15 +57,12 @@ REST_RUNS = 4 * PACK_RELAX_STEPS // RELAX_RUN_STEPS
 """Most tests for rest."""
 
 
-def write_pack_inputs(
-    case: Case, folder: Path, *, count: int, shown: tuple[int, ...] = (), places: int = 0
-) -> Deck:
+def write_pack_inputs(case: Case, folder: Path, *, count: int, places: int = 0) -> Deck:
     """Write in.pack and pack.data, `count` small spheres at random, into `folder`.
 
-    `places` numbers the sets of random places that the same grains may start from. For `shown` see
-    `render_pack`.
+    `places` numbers the sets of random places that the same grains may start from.
     """
-    deck = render_pack(case, count=count, shown=shown)
+    deck = render_pack(case, count=count)
     (folder / "in.pack").write_text(deck.text)
     radii, box = draw_radii(case, count), specimen_box(case)
     rng = np.random.default_rng([case.seed, count, *([places] if places else [])])
@@ -110,12 +107,8 @@ def check_radii(grains: Snapshot, case: Case, path: Path) -> None:
         )
 
 
-def render_pack(case: Case, *, count: int, shown: tuple[int, ...] = ()) -> Deck:
-    """The packing deck: soft springs without friction, viscous damping, growth, test for rest.
-
-    After the stages of growth in `shown` (1 to `PACK_STAGES`) it also dumps to
-    post/grown_STAGE.dump.
-    """
+def render_pack(case: Case, *, count: int) -> Deck:
+    """The packing deck: soft springs without friction, viscous damping, growth, test for rest."""
     scales = packing_scales(case)
     contact = scales.contacts["grain-grain"]
     stiffness = contact.normal_stiffness
@@ -148,7 +141,6 @@ def render_pack(case: Case, *, count: int, shown: tuple[int, ...] = ()) -> Deck:
                 for s in range(1, PACK_STAGES + 1)
             ],
             "stage_steps": PACK_STAGE_STEPS,
-            "shown": shown,
             "relax_runs": REST_RUNS,
             "relax_steps": RELAX_RUN_STEPS,
             "rest_energy": number(count * 1e-10 * 0.5 * stiffness * (0.02 * high) ** 2),

@@ -175,10 +175,10 @@ def test_every_figure_is_drawn_small(run, results, tmp_path):
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["specimen1", "specimen5"])
-def test_a_kept_state_gives_its_rows_again(root, results, name):
+def test_a_kept_state_gives_its_rows_again(results, name):
     """Whatever the processor: sorts and roots that differ between instruction sets are avoided."""
     item = replace(ITEM, name=name)
-    for row in q.result_rows(q.examine(item, find_state(root / "docs/thesis/states", item))):
+    for row in q.result_rows(q.examine(item, find_state(command.STATES, item))):
         known = rows_of(results, name, f"{row['law']}, {row['damage_law']}").iloc[0]
         for column in (one for one, value in row.items() if isinstance(value, float)):
             wanted = pytest.approx(known[column], rel=1e-6, abs=1e-9, nan_ok=True)

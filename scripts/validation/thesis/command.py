@@ -25,6 +25,9 @@ from validation.thesis.quantities import (
 )
 from validation.thesis.runs import Planned, find_state, make_runs, planned
 
+STATES = Path(__file__).parent / "states"
+"""The states at the end of the runs at full scale."""
+
 
 def main(arguments: list[str]) -> int:
     """Make or continue the runs, write tables and figures; returns the exit code.
@@ -51,7 +54,8 @@ def main(arguments: list[str]) -> int:
         refuse_folder_name(folder)
     if options.jobs < 1:
         raise CaseError(f"--jobs: {options.jobs} runs side by side, expected at least 1")
-    plan, states, failed = planned(quick=options.quick), out / "states", []
+    states = out / "states" if options.out or options.quick else STATES
+    plan, failed = planned(quick=options.quick), []
     if not options.redraw:
         show = not options.silent
         failed = make_runs(plan, states, options.runs, jobs=options.jobs, show=show)
