@@ -250,16 +250,13 @@ def test_a_killed_study_leaves_no_process(tmp_path):
     )
     parent = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path)
     children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children")
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while not (child := children.read_text().split()) and time.monotonic() < deadline:
         time.sleep(0.05)
-    assert child
-    time.sleep(2.0)
     parent.kill()
     parent.wait()
-    while Path(f"/proc/{child[0]}/cmdline").exists() and time.monotonic() < deadline:
-        if not Path(f"/proc/{child[0]}/cmdline").read_bytes():  # it has ended
-            break
+    left = Path(f"/proc/{child[0]}/cmdline")
+    while time.monotonic() < deadline and left.exists() and left.read_bytes():
         time.sleep(0.05)
     assert time.monotonic() < deadline
 

@@ -24,6 +24,7 @@ import argparse
 import ctypes
 import itertools
 import json
+import os
 import resource
 import signal
 import subprocess
@@ -154,7 +155,8 @@ def _attempt(study: Study, point: Point, work: Path) -> dict[str, Any]:
     """What a point found, its costs and its status; in a process of its own if it wants."""
     if not point.settings.get("isolated"):
         return measure_point(study, point, work)
-    command = [sys.executable, "-m", "validation.study", study.name, str(work), json.dumps(point)]
+    words = [study.name, str(work), json.dumps(point), str(os.getpid())]
+    command = [sys.executable, "-m", "validation.study", *words]
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=LONGEST_S, check=False
@@ -349,9 +351,11 @@ def _answer(*, draw: bool) -> int:
     return 0
 
 
-def _isolated(name: str, work: str, point: str) -> None:
-    """Prints what one point found, with limited memory; for a process of its own."""
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)  # it ends with the study
+def _isolated(name: str, work: str, point: str, parent: str) -> None:
+    """Prints what one point found, with limited memory; for a process that ends with `parent`."""
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL, 0, 0, 0)
+    if os.getppid() != int(parent):  # the study ended before the kernel was asked
+        return
     resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
     print(json.dumps(measure_point(read_study(name), Point(*json.loads(point)), Path(work))))
 
