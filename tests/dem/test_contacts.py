@@ -388,6 +388,7 @@ def test_fdnets_contacts_let_a_fine_leave_the_neck_in_time_and_lammps_own_hold_i
     assert time == math.inf
 
 
+@pytest.mark.nightly
 def test_hertz_contacts_lock_small_fines_with_friction_as_the_warning_says(
     binary, grains_of, tmp_path
 ):

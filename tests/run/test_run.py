@@ -322,10 +322,9 @@ def kill_when(command: list[str], ready, sign: int) -> int:
     ("moment", "sign"),
     [
         ("invade/history.csv rows", signal.SIGKILL),
-        ("sections.csv", signal.SIGKILL),
         *(
             pytest.param(name, signal.SIGKILL, marks=pytest.mark.nightly)
-            for name in ("pack/attempt_1/screen.txt", "pack/stage.json", "figures")
+            for name in ("pack/attempt_1/screen.txt", "pack/stage.json", "sections.csv", "figures")
         ),
         ("pack/attempt_1/screen.txt", signal.SIGTERM),
         ("invade/history.csv rows", signal.SIGINT),
