@@ -277,10 +277,9 @@ class Solids(NamedTuple):
     """(S,) m, the largest radius."""
 
 
-def solids_of(network: Network, place: Array, reach: Array) -> Solids:
-    """The spheres of a network and all images within `reach` (K,) m of places (K, 3) m."""
+def solids_of(network: Network, low: Array, high: Array) -> Solids:
+    """The spheres of a network and all images that reach between the corners (3,) m of a box."""
     position, radius = _spheres(network)
-    low, high = (place - reach[:, None]).min(axis=0), (place + reach[:, None]).max(axis=0)
     parts, corner, edge, shape, first, largest = [], [], [], [], [], []
     before = sphere = 0
     for some in size_classes(radius):
@@ -454,47 +453,64 @@ def bounded_resistances(
     resistance is 0 where the throat has no side, and infinite where a section is closed. It is
     that of the `whole` (K,) throats alone. `heights` (K, 2) m are those of their nodes.
     """
-    facet = network.image_position[network.throat_images[throats]]
-    facet, axes = turned_inside(network, facet, np.array(facet_axes(network, throats, facet)))
-    middle = facet.mean(axis=1)
-    corner = np.linalg.norm(facet - middle[:, None], axis=2).max(axis=1)
-    reach = np.hypot(REACH * corner, np.maximum(heights.max(axis=1), 0.0))
-    every = Bounded(
-        base=geometry.flat(facet),
-        axes=np.ascontiguousarray(axes.transpose(1, 0, 2)),
-        origin=facet[:, 0].copy(),
-        middle=middle,
-        reach=reach,
-        spans=spans_of(heights, LENGTH_FLOOR * network.grain_radius),
-        whole=whole,
-        radius=network.throat_corner_radius[throats],
+
+    def around(part: slice) -> Bounded:
+        some = throats[part]
+        facet = network.image_position[network.throat_images[some]]
+        facet, axes = turned_inside(network, facet, np.array(facet_axes(network, some, facet)))
+        middle = facet.mean(axis=1)
+        corner = np.linalg.norm(facet - middle[:, None], axis=2).max(axis=1)
+        return Bounded(
+            base=geometry.flat(facet),
+            axes=np.ascontiguousarray(axes.transpose(1, 0, 2)),
+            origin=facet[:, 0].copy(),
+            middle=middle,
+            reach=np.hypot(REACH * corner, np.maximum(heights[part].max(axis=1), 0.0)),
+            spans=spans_of(heights[part], LENGTH_FLOOR * network.grain_radius),
+            whole=whole[part],
+            radius=network.throat_corner_radius[some],
+        )
+
+    # made twice, for those of all throats at once take more room than the network
+    parts = [*geometry.slices(len(throats), THROATS)]
+    boxes = [
+        (
+            (one.middle - one.reach[:, None]).min(axis=0),
+            (one.middle + one.reach[:, None]).max(axis=0),
+        )
+        for one in map(around, parts)
+    ]
+    low, high = (
+        np.min([box[0] for box in boxes], axis=0),
+        np.max([box[1] for box in boxes], axis=0),
     )
-    solids, planes = solids_of(network, middle, reach), planes_of(network)
-    flux = np.full((len(throats), 2, STEPS + 1), np.nan)
-    ends = np.full((len(throats), 3), np.nan)
+    solids, planes = solids_of(network, low, high), planes_of(network)
+    resistance, ends = np.zeros((len(throats), 2)), np.full((len(throats), 3), np.nan)
 
     def measure(part: slice) -> None:
         room, points = near_room(ROOM), point_room(DIVISIONS)
-        t, wanted = part.start, 0
-        while t < part.stop:
+        some = around(part)
+        flux = np.full((len(some.reach), 2, STEPS + 1), np.nan)
+        t, wanted = 0, 0
+        while t < len(flux):
             if wanted > len(room.near):
                 room = near_room(2 * wanted)
             t, wanted = _set_bounded_fluxes(
-                t, part.stop, every, solids, planes, points, room, flux, ends
+                t, some, solids, planes, points, room, flux, ends[part]
             )
+        row, side = np.nonzero(some.whole[:, None] & (some.spans[:, :, 1] > 0.0))
+        span = some.spans[row, side]
+        step = (span[:, 1] - span[:, 0]) / STEPS
+        clear = np.ones(len(row))
+        resistance[part][row, side] = resistance_of(flux[row, side], clear, step, OPEN_WIDENING)
 
-    on_all_cores(measure, geometry.slices(len(throats), THROATS))
-    row, side = np.nonzero(whole[:, None] & (every.spans[:, :, 1] > 0.0))
-    resistance, span = np.zeros((len(throats), 2)), every.spans[row, side]
-    step = (span[:, 1] - span[:, 0]) / STEPS
-    resistance[row, side] = resistance_of(flux[row, side], np.ones(len(row)), step, OPEN_WIDENING)
+    on_all_cores(measure, parts)
     return resistance, ends
 
 
 @loops_in_place
 def _set_bounded_fluxes(
     first: int,
-    last: int,
     throats: Bounded,
     solids: Solids,
     planes: Array,
@@ -506,10 +522,10 @@ def _set_bounded_fluxes(
     """Sets the `flux` (K, 2, n) m4 of throats from `first` on, and 1/a (K, 3) 1/m at their ends.
 
     Where there is no room for the spheres around a throat, it returns its number and theirs, else
-    `last` and 0.
+    K and 0.
     """
     near, local = room.near, room.local
-    for t in range(first, last):
+    for t in range(first, len(throats.reach)):
         x, y, z = throats.middle[t, 0], throats.middle[t, 1], throats.middle[t, 2]
         count = set_near(x, y, z, throats.reach[t], solids, near)
         if count > len(near):
@@ -542,7 +558,7 @@ def _set_bounded_fluxes(
                 at_facet = flux[t, side, k] if height == 0.0 else at_facet
             ends[t, side] = _narrowness(flux[t, side, STEPS])
         ends[t, 2] = _narrowness(at_facet)
-    return last, 0
+    return len(throats.reach), 0
 
 
 @loops_inside
