@@ -340,7 +340,7 @@ def _side_frame(figure: Any, axes: Any, snapshot: Snapshot) -> None:
     )
     axes.grid(False)
     width, height = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
-    figure.set_size_inches(9.0, min(9.0, max(3.0, 7.2 * height / width + 1.6)))
+    figure.set_size_inches(9.0, min(9.0, max(3.0, 7.2 * height / width + 1.9)))
 
 
 # ------------------------------------------------------------------------------------------------
