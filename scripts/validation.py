@@ -4,7 +4,8 @@
     .venv/bin/python scripts/validation.py NAME [--quick] [--out DIR]
     .venv/bin/python scripts/validation.py list
 
-NAME runs a study, or goes on with it; `NAME --help` says what else it takes.
+NAME runs a study, or goes on with it; `NAME --help` says what else it takes. Comparisons with
+commands of their own: accuracy, benchmark, truth, outside, mechanics, bridging, thesis.
 """
 
 import sys
@@ -33,6 +34,8 @@ def main(arguments: Sequence[str]) -> int:
     """Runs what `arguments` name; returns the exit code."""
     name, *rest = arguments or ["--help"]
     module = CHAPTERS.get(name)
+    if name in ("-h", "--help", "list"):
+        print(__doc__)
     try:
         if module:
             return int(import_module(module).main(rest))

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -284,7 +284,10 @@ class Checkpoints:
 @cache
 def fdnet_version() -> str:
     """The version of fdnet that runs."""
-    return version("fdnet")
+    try:
+        return version("fdnet")
+    except PackageNotFoundError:
+        return "not installed as a package"
 
 
 def file_digest(path: Path) -> str:

@@ -215,8 +215,9 @@ def stage_costs(
 ) -> dict[str, dict[str, Any]]:
     """Keys of the summary: processor seconds and peak memory of LIGGGHTS and of fdnet itself.
 
-    `stages` are the records of those that run LIGGGHTS; `own` are fdnet's processor seconds in
-    this session. The memory of fdnet is that of this session, of LIGGGHTS that of its largest run.
+    `stages` are the records of those that run LIGGGHTS, each with the seconds of the session that
+    finished it; `own` are fdnet's processor seconds in this session. The memory of fdnet is that
+    of this process so far, of LIGGGHTS that of its largest run.
     """
     done = [record for record in stages if record]
     runs = [run for record in done for run in record["runs"]]

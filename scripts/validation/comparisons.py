@@ -160,8 +160,16 @@ def _value(text: Any) -> Value:
 
 
 def measure(comparisons: Sequence[Comparison], path: Path, *, quick: bool) -> None:
-    """Adds the points that the CSV lacks to it, one after the other."""
-    known = {(row.comparison, row.value, row.seed) for row in read_rows(path).itertuples()}
+    """Adds the points that the CSV lacks to it, one after the other; those that failed again.
+
+    Raises CaseError at the end, when all others are measured, with the first that failed.
+    """
+    rows, failed = read_rows(path), []
+    known = {
+        (row.comparison, row.value, row.seed) for row in rows.itertuples() if row.status == DONE
+    }
+    if (rows.status != DONE).any():
+        rows[rows.status == DONE].to_csv(path, index=False)
     path.parent.mkdir(parents=True, exist_ok=True)
     for one in comparisons:
         for value, seeds in (one.quick if quick else one.full).items():
@@ -175,6 +183,7 @@ def measure(comparisons: Sequence[Comparison], path: Path, *, quick: bool) -> No
                     seen = dict(one.measure(Trial(value, seed, folder, quick)))
                 except FdnetError as error:
                     status = " ".join(str(error).split())
+                    failed.append(f"{one.name} {value} {seed}: {status}")
                 core = round(_core_seconds() - before, 3)
                 with path.open("a", newline="", encoding="utf-8") as file:
                     writer = csv.writer(file)
@@ -184,6 +193,10 @@ def measure(comparisons: Sequence[Comparison], path: Path, *, quick: bool) -> No
                         for name, observed in seen.items()
                     )
                 print(f"{one.name} {value} {seed}: {seen} {status}", file=sys.stderr, flush=True)
+    if failed:
+        raise CaseError(
+            f"{path}: {len(failed)} points failed, the first: {failed[0]}; run the command again"
+        )
 
 
 def _core_seconds() -> float:

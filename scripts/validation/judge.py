@@ -83,7 +83,7 @@ class Level(NamedTuple):
 
     @property
     def seeds_needed(self) -> int | None:
-        """Fewest seeds with which a mean error of this size would; None for more than 10,000."""
+        """Seeds, to a tenth, with which a mean error of this size would; None above 10,000."""
         scatter = self.band * math.sqrt(self.runs) / _quantile(self.runs)
         for seeds in (int(2 * 1.1**n) for n in range(90)):
             if _quantile(seeds) * scatter / math.sqrt(seeds) <= abs(self.error):

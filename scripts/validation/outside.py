@@ -557,7 +557,7 @@ def collision(trial: Trial) -> Seen:
     return {"error of the overlap": first, "error of restitution or duration": second}
 
 
-SOFT, LAMMPS, LEAVES_AFTER = "soft shear on a soft spring", "LAMMPS's own", 0.145
+SOFT, LAMMPS = "soft shear on a soft spring", "LAMMPS's own"
 NECKS = {SOFT: (12.5, SHEAR_RATIO, 0.1), LAMMPS: (1e4, 0.8235, 0.0)}
 """Stiffness, N/m, that of shear over it, and the time step over sqrt(m/k), 0 for 1e-6 s."""
 

@@ -47,8 +47,12 @@ from validation import judge
 
 FOLDER = Path(__file__).with_name("studies")
 KEPT = Path(__file__).resolve().parents[2] / "docs" / "evidence" / "error_against_time"
-NAMES = ("stiffness", "time-step", "drag", "flow-updates", "specimen-size", "size-ratio", "laws",
-         "velocity-field", "linear-solver")  # fmt: skip
+NAMES = tuple(
+    path.stem
+    for path in sorted(FOLDER.glob("*.toml"))
+    if "\nquestion = " in path.read_text("utf-8")
+)
+"""The studies: the files with a question. The other files are cases of theirs."""
 SWEEP = ("name", "case", "cases", "seeds", "set", "grid", "variants")
 POINTS = "points.jsonl"
 Result = TypeVar("Result")
@@ -222,6 +226,8 @@ def swept(study: Study, out: Path, *, jobs: int | None, show: bool) -> Iterator[
     write_text(path, tomli_w.dumps({key: data[key] for key in SWEEP if key in data}))
     stages = ("pack", "invade", "analyse")
     runs = fdnet.sweep(path, out=out / "sweep", jobs=jobs, stages=stages, progress=show).table
+    if not (runs["status"] == judge.DONE).any():
+        raise CaseError(f"{out / 'sweep'}: no run was done, the first because: {runs.reason[0]}")
     numbers = runs.rename(columns=lambda name: name.replace(".", "_"))
     observed = {name: numbers.eval(text) for name, text in study.data["quantities"].items()}
     by_run = pd.DataFrame(observed, index=runs.index).to_dict("records")
@@ -277,7 +283,7 @@ def run_study(
         lines += swept(study, out, jobs=jobs, show=show)
     rows = judge.judged(judge.rows_from(lines), study.rules)
     judge.write_rows(rows, out / f"{study.name}.csv")
-    draw(study.data["panel"], rows, out / f"{study.name}.png")
+    draw(study.data.get("panel", ()), rows, out / f"{study.name}.png")
     return rows
 
 
@@ -292,7 +298,7 @@ def study_table(study: Study, rows: pd.DataFrame) -> str:
             series=panel.get("series", ("*",)),
             signed=not panel.get("magnitude", False),
         )
-        for panel in study.data["panel"]
+        for panel in study.data.get("panel", ())
     ]
     return "\n\n".join([*parts, *judge.failures(rows)])
 

@@ -30,8 +30,6 @@ FILE = Path(__file__).with_suffix(".npz")
 EQUAL, UNEQUAL = "random, equal grains", "random, unequal grains"
 LATTICE, LOOSE = "touching lattices", "loose lattices"
 GROUPS = EQUAL, UNEQUAL, LATTICE, LOOSE
-LOOSE_SOLIDS = (0.45, 0.343, 0.216)
-"""Volume fractions of the grains in the loose lattices, which are made in code."""
 YES, LATER = "yes", "later"
 GRAINS, DEPOSIT = "grains", "deposit"
 """What is solid in a row of `slab_grids`: the grains alone, or the fines too."""

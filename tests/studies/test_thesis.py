@@ -173,6 +173,14 @@ def test_every_figure_is_drawn_small(run, results, tmp_path):
     assert all(path.stat().st_size < 100_000 for path in tmp_path.glob("*.png"))
 
 
+def test_every_kept_state_is_that_of_its_run():
+    """`find_state` refuses one of another case."""
+    kept = sorted(path.name for path in command.STATES.glob("*-seed*.npz"))
+    plan = {item.file: item for item in planned(quick=False)}
+    assert len(kept) > 20
+    assert all(find_state(command.STATES, plan[name]) is not None for name in kept)
+
+
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["specimen1", "specimen5"])
 def test_a_kept_state_gives_its_rows_again(results, name):

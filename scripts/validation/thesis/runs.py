@@ -22,8 +22,6 @@ from fdnet.files import write_bytes, write_text
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from validation.thesis.published import TABLE3, rows_in
 
-VARIANTS = ("specimen1-7to8", "specimen1-1410", "specimen5-5to6", TABLE3)
-
 # ------------------------------------------------------------------------------------------------
 # The plan.
 
