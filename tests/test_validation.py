@@ -126,7 +126,7 @@ def test_what_cannot_be_judged_is_refused_with_its_reason(tmp_path):
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(CaseError, match="has the columns"):
         judge.read_rows(tmp_path / "other.csv")
-    with pytest.raises(CaseError, match="is not known, expected one of stiffness"):
+    with pytest.raises(CaseError, match="is not known, expected one of drag"):
         study.read_study("nothing")
     (tmp_path / "precious.txt").write_text("mine")
     with pytest.raises(CaseError, match="holds no study"):
