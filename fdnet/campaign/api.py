@@ -182,7 +182,9 @@ def _carried_out(
     progress: bool = False,
     **how: Any,
 ) -> Compared:
-    running = HowToRun(jobs=jobs or max(1, cores() // plan.ranks), quiet=not progress, **how)
+    running = HowToRun(
+        jobs=max(1, cores() // plan.ranks) if jobs is None else jobs, quiet=not progress, **how
+    )
     goal = None if until is None else parse_until(until)
     return _compared(carry_out(path, plan, running, goal, ranked_by, most_seeds=max_seeds))
 

@@ -27,6 +27,7 @@ from fdnet.run.folder import MANIFEST, RECORDS
 from fdnet.run.progress import ONE_CORE
 
 PAUSE, PATIENCE = 0.05, 120.0
+ENGINES = ("local", "snakemake", "slurm")
 """Seconds between two looks at the runs, and seconds that they may take to stop in good order."""
 
 
@@ -51,6 +52,12 @@ class HowToRun:
     engine: str = "local"
     resources: tuple[str, ...] = ()
     quiet: bool = False
+
+    def __post_init__(self) -> None:
+        if self.jobs < 1:
+            raise CaseError(f"jobs: {self.jobs} runs at the same time, expected at least 1")
+        if self.engine not in ENGINES:
+            raise CaseError(f"engine: {self.engine!r}, expected one of {', '.join(ENGINES)}")
 
     @property
     def options(self) -> list[str]:
@@ -185,9 +192,13 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> Non
     When this is left by an exception, the running ones are stopped in good order.
     """
     waiting, running, full = list(tasks), dict[str, subprocess.Popen](), False
+    failed: set[str] = set()
     try:
         while running or (waiting and not full):
             full = full or disk_is_full(path)
+            for task in [task for task in waiting if task.after in failed]:
+                waiting.remove(task)
+                ended(task.name, 1)
             not_ended = {task.name for task in waiting} | running.keys()
             ready = [task for task in waiting if task.after not in not_ended]
             for task in [] if full else ready[: jobs - len(running)]:
@@ -203,6 +214,7 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> Non
                             f"\nfdnet: ended by signal {-code} ({signal.Signals(-code).name}), "
                             "perhaps for want of memory; repeat the command to go on\n"
                         )
+                failed |= {name} if code else set()
                 ended(name, code)
             time.sleep(PAUSE)
     finally:

@@ -37,7 +37,12 @@ Another MPI does not read these variables."""
 
 def environment(ranks: int) -> dict[str, str]:
     """The environment of this process, and what LIGGGHTS on so many `ranks` needs."""
-    return os.environ | _ALWAYS | (_ALONE if ranks == 1 else {})
+    if ranks > 1:
+        return os.environ | _ALWAYS
+    # in a job of Slurm a lone Open MPI would look for the job step that these name
+    steps = ("SLURM_", "PMI_", "PMIX_")
+    own = {name: value for name, value in os.environ.items() if not name.startswith(steps)}
+    return own | _ALWAYS | _ALONE
 
 
 # ------------------------------------------------------------------------------------------------
