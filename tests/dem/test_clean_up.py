@@ -119,14 +119,6 @@ def test_what_came_out_and_what_stays_is_what_was_there(run):
     assert damaged < summary["return_k_over_k0"] <= 1.0
 
 
-def test_a_finished_clean_up_is_not_repeated(run):
-    folder, summary = run
-    stamp = (folder / "clean_up" / "log.liggghts").stat().st_mtime_ns
-    options = RunOptions(out=folder, show_progress=False, stages=STAGES)
-    assert run_stages(small(), options) == summary
-    assert (folder / "clean_up" / "log.liggghts").stat().st_mtime_ns == stamp
-
-
 def cut_everywhere(start, folder, binary, scheme, ranks):
     """Cut the clean-up at every checkpoint; it goes on bit for bit, on its number of ranks."""
     keys = (f"drag.scheme={scheme}", "drag.pressure_gradient=true", "clean_up.duration_ms=1.0")

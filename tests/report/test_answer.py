@@ -9,9 +9,8 @@ import pytest
 from builders import naming
 from scipy.integrate import solve_ivp
 
-from fdnet.case.file import read_case
 from fdnet.report.tables import in_millidarcy, millidarcy, percent
-from fdnet.report.text import answer_sentence, end_words, in_place_words
+from fdnet.report.text import answer_sentence, in_place_words
 from fdnet.run.answer import (
     FULL,
     QUICK,
@@ -241,21 +240,6 @@ def test_the_answer_is_a_sentence_to_act_on():
             text = answer_sentence(SUMMARY | changed)
             assert all(part in text for part in said), text
             assert not_said not in text
-
-
-def test_the_end_is_named_by_the_rule_that_ended_the_run(root):
-    for reason, run, rate, said in [
-        ("plugged", {}, None, "no fine crossed it"),
-        ("plugged", {"plug_rate": 0.02}, None, "at most 2.0 % of the fines"),
-        ("plugged", {"stop_rate": 0.2}, 0.19, "below 20.0 % of the first"),
-        ("plugged", {"stop_rate": 0.2}, 0.5, "no fine crossed it"),
-        ("duration", {}, None, "time or volume"),
-        ("supply_exhausted", {}, None, "supply of fines ran out"),
-        ("cap", {}, None, "cap"),
-    ]:
-        with naming(reason, run, rate, said):
-            control = read_case(root / "cases/quick.toml").run.model_copy(update=run)
-            assert said in end_words({"stop_reason": reason, "rate_over_initial": rate}, control)
 
 
 # ------------------------------------------------------------------------------------------------
