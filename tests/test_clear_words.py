@@ -100,18 +100,6 @@ def test_limits_of_time_ranks_and_grains_are_refused_before_anything_runs(tmp_pa
     assert not (tmp_path / "run").exists()
 
 
-def test_a_picture_that_could_not_be_drawn_is_said_on_standard_error(
-    tmp_path, case, capsys, monkeypatch
-):
-    from fdnet.run import pipeline
-
-    reason = "no 3-D picture: the drawing process ended with signal 9; no usable OpenGL?"
-    monkeypatch.setattr(pipeline, "run_stages", lambda *_: {"warnings": [reason]})
-    code, err = answer(capsys, "run", case, "--out", tmp_path / "run", "--json")
-    assert code == 0
-    assert err == f"fdnet: warning: {reason}\n"
-
-
 def test_surroundings_are_named_and_not_blamed_on_liggghts(tmp_path, monkeypatch):
     import resource
 
@@ -175,12 +163,6 @@ def test_fines_beyond_the_side_walls_are_counted():
     assert not any("side walls" in text for text in analyse(pack([1.0, 1.0, 1.0])).warnings)
     around = analyse(pack([1.0, 3.4, 1.0]), periodic="yz")
     assert not any("side walls" in text for text in around.warnings)
-
-
-def test_porosities_that_were_not_validated_are_warned_of():
-    loose = analyse(pack(side=4.0))
-    assert any("outside 0.25 to 0.50" in text for text in loose.warnings)
-    assert not any("outside 0.25" in text for text in analyse(pack()).warnings)
 
 
 def test_a_permeability_above_that_of_the_empty_duct_is_said_with_its_number():

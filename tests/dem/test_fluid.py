@@ -570,15 +570,3 @@ def test_the_mean_over_the_way_in_a_flow_that_speeds_up():
     assert mean[0, 1:] == pytest.approx(0.0)
     slow = mean_ahead(movers((0.3, 0.0, 0.0), 1e-9), lambda at: a * at, time)
     assert slow[0] == pytest.approx([1.5, 0.0, 0.0]), "one that drag hardly moves stays"
-
-
-def test_a_way_that_leads_into_a_grain_ends_before_it():
-    """The grain begins at x = 1; the fluid before it has the velocity 1 at 0 and 2 at 1."""
-
-    def fluid(at):
-        assert np.all(np.isfinite(at))
-        return np.where(at[:, :1] < 1.0, (1.0 + at[:, :1]) * np.array([1.0, 0.0, 0.0]), 0.0)
-
-    near = mean_ahead(movers((0.0, 0.0, 0.0), TRACER), fluid, 100.0)
-    assert 1.0 <= near[0, 0] < 2.0
-    assert mean_ahead(movers((1.5, 0.0, 0.0), TRACER), fluid, 1.0)[0] == pytest.approx(0.0)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from bench import bench
 from builders import resting_spheres, tiny
-from cut_and_continue import StopError
 
 from fdnet.dem import invade_deck
 from fdnet.dem.checkpoint import (
@@ -67,10 +66,10 @@ def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(go, tmp_pat
     ("scheme", "forces"),
     [("implicit", ()), ("held", ("drag.inertia=schiller-naumann", "drag.pressure_gradient=true"))],
 )
-def test_a_batched_invasion_accounts_for_every_fine_and_resumes(go, tmp_path, scheme, forces):
+def test_a_batched_invasion_accounts_for_every_fine(go, tmp_path, scheme, forces):
     keys = ("fines.supply=batches", "fines.count=900", "run.checkpoint_ms=0.005")
     case = tiny(*keys, f"drag.scheme={scheme}", "run.cap_ms=0.1", "fines.friction=0.2", *forces)
-    whole, batches = go(case, tmp_path / "whole"), batches_of(case, scales_of(case))
+    whole, batches = go(case, tmp_path), batches_of(case, scales_of(case))
     last = whole.history[-1]
     assert len(batches.counts) > 5
     assert (
@@ -79,18 +78,6 @@ def test_a_batched_invasion_accounts_for_every_fine_and_resumes(go, tmp_path, sc
         == last.upstream + last.invaded + last.passed
     )
     assert whole.max_overlap < (0.15 if forces else 0.1)
-
-    def stop(line: str) -> None:
-        if line.startswith("FDNET checkpoint 4 "):
-            raise StopError
-
-    with pytest.raises(StopError):
-        go(case, tmp_path / "cut", follow=stop)
-    for lost in [*(tmp_path / "cut" / "supply").glob("batch_1?.*")]:
-        lost.unlink()
-    again = go(case, tmp_path / "cut")
-    assert again.history == whole.history
-    assert np.array_equal(again.damaged.position, whole.damaged.position)
 
 
 def test_every_stop_reason_is_told_and_fines_that_pass_are_removed(go, tmp_path):

@@ -155,20 +155,6 @@ def test_a_batch_enters_before_it_could_meet_the_cake(concentration):
     assert max(entered) <= batches.reach + 1e-15
 
 
-def test_batches_follow_the_mud_where_it_slows_down():
-    """After the travel of n chunks of undisturbed mud the batches of chunk n + 1 are there."""
-    batches = batches_of(tiny(*BATCHED), scales_of(tiny(*BATCHED)))
-    assert [batches.entered_at(chunk) for chunk in (1, 2, 5)] == [2, 3, 6]
-    assert batches.supplied(batches.entered_at(10_000)) == 900
-    moved = batches.travel * np.array([0.0, 0.99, 1.0, 1.5, 2.0, 1e6])
-    assert [batches.entered_after(one) for one in moved] == [2, 2, 3, 3, 4, len(batches.counts)]
-    for entered in (2, 3, len(batches.counts)):
-        assert batches.entered_with(batches.supplied(entered)) == entered
-        assert batches.entered_with(batches.supplied(entered) - 1) == entered
-    assert batches.entered_with(0) == 2
-    assert batches.entered_with(10_000) == len(batches.counts)
-
-
 # ------------------------------------------------------------------------------------------------
 # Batches that come as the mud carries them, clear of fines that lag behind.
 

@@ -250,14 +250,6 @@ PRESSURE, VISCOSITY, PACK = 3.5e6, 0.05, 4e7
 """Pa, Pa s, and the resistance of the pack in 1/m."""
 
 
-PRESSURE, VISCOSITY, PACK = 3.5e6, 0.05, 4e7
-"""Pa, Pa s, and the resistance of the pack in 1/m."""
-
-
-PRESSURE, VISCOSITY, PACK = 3.5e6, 0.05, 4e7
-"""Pa, Pa s, and the resistance of the pack in 1/m."""
-
-
 def grown(times):
     """Filtrate per area of a Carman-Kozeny cake that grows on a pack, integrated step by step.
 

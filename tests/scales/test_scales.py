@@ -108,17 +108,6 @@ def test_damping_takes_the_mass_of_what_moves():
             )
 
 
-def test_supply_from_count_and_from_slab():
-    counted = scales_of(tiny())
-    assert counted.slab_length == pytest.approx(
-        300 * 4 / 3 * math.pi * (0.05e-3) ** 3 / (0.1 * 1.6e-3**2)
-    )
-    slab = scales_of(tiny("fines={radius_mm=0.05, slab_mm=0.5}"))
-    assert slab.supplied_count == round(
-        0.1 * 0.5e-3 * 1.6e-3**2 / (4 / 3 * math.pi * (0.05e-3) ** 3)
-    )
-
-
 def test_drag_that_presses_contacts_shut_is_refused():
     """6 pi mu M r u / k over 2 r: at M = 1000 a fine would be pressed through a grain."""
     with pytest.raises(CaseError, match="drag alone would press"):

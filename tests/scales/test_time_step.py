@@ -123,15 +123,6 @@ def test_a_derived_step_keeps_both_bounds_without_a_warning():
             assert stiff.time_step == pytest.approx(factor * bound())
 
 
-def test_drag_is_never_held_longer_than_a_chunk():
-    """A nearly inviscid fluid has tau of hours; counts are still wanted every grain diameter."""
-    case = tiny("fluid.viscosity_cP=1e-9", "fluid.velocity_m_s=1.0")
-    scales = scales_of(case)
-    assert scales.relaxation_time[0] > 1.0
-    assert scales.hold_steps == scales.checkpoint_steps
-    assert scales.checkpoint_steps * scales.time_step == pytest.approx(0.5e-3, rel=1e-3)
-
-
 def test_a_refresh_beyond_the_chunk_is_refused():
     with pytest.raises(CaseError, match=r"between checkpoints; expected at most \d+"):
         scales_of(
