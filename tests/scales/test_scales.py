@@ -79,15 +79,12 @@ def test_stiffness_auto_is_the_least_that_keeps_overlaps_small():
             assert not any("overlap" in warning for warning in auto.warnings)
 
 
-def test_a_pack_of_stiffness_auto_depends_on_what_decides_it():
-    one, other = (
-        tiny("run.stiffness_N_m=auto", f"fluid.velocity_m_s={v!r}").digest("pack")
-        for v in (1e-3, 9.0)
-    )
+def test_one_seed_has_one_pack_whatever_stiffness_the_invasion_takes():
+    auto = (f"fluid.velocity_m_s={v!r}" for v in (1e-3, 9.0))
+    packs = {tiny("run.stiffness_N_m=auto", one).digest("pack") for one in auto}
+    assert packs == {tiny().digest("pack")}
     slow = scales_of(tiny("run.stiffness_N_m=auto", "fluid.velocity_m_s=1e-3")).contacts
     assert max(c.normal_stiffness for c in slow.values()) == pytest.approx(1e4), "the default"
-    assert one != other
-    assert len({tiny(f"fluid.velocity_m_s={v!r}").digest("pack") for v in (1e-3, 9.0)}) == 1
 
 
 def test_damping_takes_the_mass_of_what_moves():
