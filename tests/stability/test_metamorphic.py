@@ -143,8 +143,8 @@ def spheres(spread: float) -> Snapshot:
 @pytest.mark.parametrize("periodic", ["xyz", "yz", ""])
 def test_another_description_of_the_same_pack_gives_its_permeability(tmp_path, capsys, periodic):
     """Radii of a wide range in all ways; equal ones, where prisms are cospherical, in two."""
-    few = ("permuted", "mirrored in x") if periodic == "yz" else ()
-    for spread, names in ((0.3, tuple(CHANGES)), (0.0, few)):
+    few = [(0.0, ("permuted", "mirrored in x"))] if periodic == "yz" else []
+    for spread, names in [(0.3, tuple(CHANGES)), *few]:
         pack = pack_of(spheres(spread), periodic)
         for damage_law, rounding in (("thesis", ROUNDING), ("auto", RAYS[periodic])):
             law = ("--damage-law", damage_law)

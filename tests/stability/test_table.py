@@ -1,4 +1,4 @@
-"""The table of evidence, and the page of promises, name tests that exist."""
+"""The table of evidence names tests that exist."""
 
 import ast
 import csv
