@@ -10,6 +10,7 @@ import pytest
 from fdnet.case.case import Case
 from fdnet.dem.liggghts import Binary, Launch, find_binary
 from fdnet.dem.packing import make_pack
+from fdnet.network.permeability import Analysis, analyse
 from fdnet.run.finished import FinishedRun
 from fdnet.spheres.snapshot import Snapshot
 
@@ -69,3 +70,11 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> FinishedRun:
 
     out = tmp_path_factory.mktemp("fixed") / "run"
     return run_case(tiny("run.cap_ms=0.35", "box.sides=periodic"), out)
+
+
+@pytest.fixture(scope="session")
+def analysed(finished: FinishedRun) -> Analysis:
+    """The analysis of that run, made again from its spheres."""
+    case = finished.case
+    spheres = finished.spheres("initial"), finished.spheres()
+    return analyse(*spheres, periodic=case.periodic, options=case.analysis)

@@ -11,15 +11,11 @@ import pytest
 from builders import naming, tiny
 
 import fdnet
-from fdnet.campaign.page import value_text
 from fdnet.case.file import case_from
 from fdnet.case.tables import AnalysisChoices
 from fdnet.cli import main
-from fdnet.report.html import ReportParts, write_report
-from fdnet.report.text import summary_lines, text_lines
 from fdnet.run.pipeline import with_default_laws
 from fdnet.scales.check import PERIODIC, WALLS, WIDTHS, checked, width_error
-from fdnet.scales.clock import spoken_memory, spoken_time
 from fdnet.scales.scales import scales_of
 
 
@@ -179,21 +175,6 @@ def test_a_stop_inside_a_compiler_is_one_line():
             assert "repeat the command to go on (a run: with --resume)" in line
 
 
-def test_times_are_said_in_hours_and_minutes():
-    assert (spoken_memory(6.6e8), spoken_memory(2.34e9)) == ("660 MB", "2.3 GB")
-    for seconds, words in [
-        (0.2, "1 s"),
-        (62, "62 s"),
-        (110, "2 min"),
-        (7200, "2 h"),
-        (12000, "3 h 20 min"),
-        (5e5, "139 h"),
-        (1e9, "2.8e+05 h (32 years)"),
-    ]:
-        with naming(seconds, words):
-            assert spoken_time(seconds) == words
-
-
 def test_laws_of_the_thesis_are_said_to_be_wrong_with_the_default_beside(finished, capsys):
     """The second number is what the same spheres give by the default laws in a run of its own."""
     grains, damaged = finished.spheres("initial"), finished.spheres("damaged")
@@ -209,14 +190,3 @@ def test_laws_of_the_thesis_are_said_to_be_wrong_with_the_default_beside(finishe
     assert "warning: the laws thesis and thesis are kept to compare" in capsys.readouterr().out
     assert main(["permeability", spheres]) == 0
     assert "thesis" not in capsys.readouterr().out
-
-
-def test_nothing_is_said_to_have_lost_minus_zero(finished, tmp_path):
-    summary = json.loads((finished.path / "summary.json").read_text(encoding="utf-8"))
-    summary["k_reduction"] = -1e-9
-    for row in summary["sections"]:
-        row["k_reduction"] = -1e-9
-    page = write_report(tmp_path / "report.html", summary, parts=ReportParts())
-    texts = [*summary_lines(summary), *text_lines(finished.path, summary)]
-    assert "-0.0" not in "\n".join(texts) + page.read_text(encoding="utf-8")
-    assert value_text("k_reduction", -0.0) == "0 %"

@@ -1,6 +1,5 @@
 """Damaged inputs, strange surroundings and impossible values end with one clear line."""
 
-import json
 import os
 import subprocess
 import sys
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 from builders import tiny
 
-from fdnet.errors import CaseError, DumpError, LiggghtsError, NetworkError
+from fdnet.errors import DumpError, LiggghtsError, NetworkError
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Snapshot
 from tests.run.test_foreign_folders import CUBE, answer
@@ -90,40 +89,6 @@ def test_a_dump_of_a_run_with_a_sphere_of_no_kind_or_size_is_named():
             snapshot_of(frame, tiny(), time_s=0.0)
 
 
-def test_records_of_another_shape_are_named(tmp_path):
-    from fdnet.run.folder import read_manifest, read_record
-
-    row = {"version": "3.8.0", "seconds": 1.0, "liggghts_s": 1.0}
-    files = {"files": {"x": "y"}, "ranks": 1}
-    numbers = dict.fromkeys(
-        ("seconds", "max_overlap", "steps", "dt_s", "supplied", "porosity", "porosity_assumed"), 1
-    )
-    texts = {"digest": "x", "stop_reason": "x", "left_out": [], "warnings": []}
-    good = {"format": 1, "stages": [], "invade": None, "runs": [row], "attempts": [row], **files}
-    for stage, key, value in (
-        ("pack", "runs", []),
-        ("pack", "runs", ["x"]),
-        ("pack", "seconds", "long"),
-        ("pack", "attempts", {}),
-        ("invade", "warnings", [1]),
-        ("invade", "digest", None),
-        ("manifest", "stages", {"pack": 1}),
-        ("manifest", "invade", [1]),
-        ("manifest", "stages", None),
-    ):
-        path = tmp_path / ("manifest.json" if stage == "manifest" else f"{stage}/stage.json")
-        path.parent.mkdir(exist_ok=True)
-
-        def read(stage: str = stage) -> object:
-            return read_manifest(tmp_path) if stage == "manifest" else read_record(tmp_path, stage)
-
-        path.write_text(json.dumps(good | numbers | texts))
-        assert read() is not None
-        path.write_text(json.dumps(good | numbers | texts | {key: value}))
-        with pytest.raises(CaseError, match=rf"{key}.*--force"):
-            read()
-
-
 def test_limits_of_time_ranks_and_grains_are_refused_before_anything_runs(tmp_path, case, capsys):
     run = ["run", case, "--out", tmp_path / "run", "--set", "fluid.velocity_m_s=0.1"]
     for option, word in (
@@ -133,29 +98,6 @@ def test_limits_of_time_ranks_and_grains_are_refused_before_anything_runs(tmp_pa
     ):
         assert word in refusal(capsys, *run, option)
     assert not (tmp_path / "run").exists()
-
-
-def test_more_ranks_than_cores_are_warned_of_at_once(tmp_path, case, capsys, monkeypatch):
-    from fdnet.run import pipeline
-    from fdnet.run import records as session
-
-    monkeypatch.setattr(pipeline, "run_stages", lambda *_: {})
-    monkeypatch.setattr(session, "cores", lambda: 2)
-    code, err = answer(capsys, "run", case, "--out", tmp_path / "run", "--np", "64")
-    assert code == 0
-    assert "--np 64: this machine has 2 cores" in err
-
-
-def test_a_picture_that_could_not_be_drawn_is_said_on_standard_error(
-    tmp_path, case, capsys, monkeypatch
-):
-    from fdnet.run import pipeline
-
-    reason = "no 3-D picture: the drawing process ended with signal 9; no usable OpenGL?"
-    monkeypatch.setattr(pipeline, "run_stages", lambda *_: {"warnings": [reason]})
-    code, err = answer(capsys, "run", case, "--out", tmp_path / "run", "--json")
-    assert code == 0
-    assert err == f"fdnet: warning: {reason}\n"
 
 
 def test_surroundings_are_named_and_not_blamed_on_liggghts(tmp_path, monkeypatch):
@@ -170,26 +112,6 @@ def test_surroundings_are_named_and_not_blamed_on_liggghts(tmp_path, monkeypatch
     monkeypatch.setattr(resource, "getrlimit", lambda _: (32, 4096))
     with pytest.raises(LiggghtsError, match=r"ulimit -n: only 32 files"):
         find_binary()
-
-
-def test_a_program_without_its_helpers_is_named(tmp_path):
-    from fdnet.dem.liggghts import find_binary
-
-    fake = tmp_path / "liggghts"
-    fake.write_text("#!/bin/sh\nno-such-helper-of-liggghts\n")
-    fake.chmod(0o755)
-    with pytest.raises(LiggghtsError, match="a program or library that it needs was not found"):
-        find_binary(str(fake))
-
-
-def test_a_disk_without_free_inodes_is_full(tmp_path, monkeypatch):
-    from fdnet import files as atomic
-
-    class NoInodes:
-        f_files, f_favail = 100, 0
-
-    monkeypatch.setattr(os, "statvfs", lambda _: NoInodes)
-    assert atomic.disk_is_full(tmp_path)
 
 
 def command(*arguments: object, **environment: str) -> subprocess.CompletedProcess[bytes]:
@@ -217,57 +139,6 @@ def test_a_terminal_that_knows_ascii_alone_and_names_that_are_no_utf_8(tmp_path,
     assert b"k\\xf6rner/pack/in.pack" in done.stdout
 
 
-def test_a_reader_that_has_gone_does_not_fail_the_command(tmp_path):
-    (tmp_path / "s.csv").write_text(CUBE)
-    line = f"'{sys.executable}' -m fdnet.cli permeability s.csv --compare-laws | true; "
-    done = subprocess.run(
-        ["bash", "-c", line + 'echo "${PIPESTATUS[0]}"'],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.stdout.strip() == "0"
-    assert done.stderr == ""
-
-
-def test_a_library_that_cannot_be_loaded_is_named(tmp_path, capsys, monkeypatch):
-    """As under a limit of memory: the linker cannot map a library, or Python itself fails."""
-    from fdnet.commands import permeability as permeability_command
-
-    table = tmp_path / "s.csv"
-    table.write_text(CUBE)
-    with monkeypatch.context() as patch:
-        patch.setitem(sys.modules, "fdnet.spheres.readers", None)
-        arguments = ("permeability", table, "--units", "mm", "--box", "0,1,0,1,0,1")
-        assert "fdnet: a library cannot be loaded (" in refusal(capsys, *arguments)
-
-    def importing(_):
-        raise SystemError("_find_and_load returned NULL without setting an exception")
-
-    monkeypatch.setattr(permeability_command, "run", importing)
-    assert "give fdnet more memory" in refusal(capsys, "permeability", table)
-
-
-def test_a_stop_that_a_library_turns_into_its_own_error_is_a_stop(capsys, monkeypatch, tmp_path):
-    import signal
-
-    from fdnet.commands import permeability as permeability_command
-
-    def importing(_):
-        try:
-            signal.raise_signal(signal.SIGTERM)
-        except KeyboardInterrupt as stop:
-            raise ImportError("initialisation failed") from stop
-
-    before = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr(permeability_command, "run", importing)
-    code, err = answer(capsys, "permeability", tmp_path / "s.csv")
-    signal.signal(signal.SIGTERM, before)
-    assert code == 130
-    assert "stopped" in err
-
-
 def pack(fine: list[float] | None = None, radius: float = 0.1, *, side: float = 3.0) -> Snapshot:
     """The cubic lattice of 27 touching grains of radius 0.5 in a box, with one fine."""
     places = (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5).tolist()
@@ -292,12 +163,6 @@ def test_fines_beyond_the_side_walls_are_counted():
     assert not any("side walls" in text for text in analyse(pack([1.0, 1.0, 1.0])).warnings)
     around = analyse(pack([1.0, 3.4, 1.0]), periodic="yz")
     assert not any("side walls" in text for text in around.warnings)
-
-
-def test_porosities_that_were_not_validated_are_warned_of():
-    loose = analyse(pack(side=4.0))
-    assert any("outside 0.25 to 0.50" in text for text in loose.warnings)
-    assert not any("outside 0.25" in text for text in analyse(pack()).warnings)
 
 
 def test_a_permeability_above_that_of_the_empty_duct_is_said_with_its_number():

@@ -130,17 +130,6 @@ def answering(monkeypatch, replies):
     return asked
 
 
-def test_on_a_terminal_what_is_missing_is_asked_for(tmp_path, monkeypatch):
-    replies = {"Sand, D50": ["0.40 mm"], "Solids, D90": ["90 um"]}
-    asked, out = answering(monkeypatch, replies), tmp_path / "case.toml"
-    assert init(out, sand_d50="") == 0
-    case = read_case(out)
-    assert case.grains.sizes.D50_mm == 0.4
-    assert case.fines.sizes.D90_mm == pytest.approx(0.09)
-    assert case.fines.sizes.D10_mm == pytest.approx(0.02)
-    assert not any(prompt.startswith(("Sand, D10", "Viscosity")) for prompt in asked)
-
-
 def test_one_bad_answer_is_asked_for_again_and_the_others_stay(tmp_path, monkeypatch, capsys):
     """One that cannot be read at once, one that makes no case when all are there."""
     replies = {
@@ -159,17 +148,6 @@ def test_one_bad_answer_is_asked_for_again_and_the_others_stay(tmp_path, monkeyp
     said = capsys.readouterr().err
     for text in ("--sand-d50: '0.40': has no unit", "--viscosity: 'ten cP'", "--solids: 0.45"):
         assert text in said
-
-
-def test_an_ordinary_carbonate_mud_makes_a_case(tmp_path, capsys):
-    """With no cut it has more fines than fdnet takes; what is left out is said."""
-    out = tmp_path / "case.toml"
-    sizes = {"mud_d10": "2 um", "mud_d50": "20 um", "mud_d90": "70 um"}
-    assert init(out, overbalance="200 psi", **sizes) == 0
-    said, curve = capsys.readouterr().out, read_case(out).fines.curve
-    assert curve.kept >= 0.5
-    assert f"left out: {100 * curve.below:.2g} % of the solids, finer than" in said
-    assert main(["check", str(out)]) == 0
 
 
 def test_cases_lists_and_copies_what_comes_with_fdnet(tmp_path, capsys, root, monkeypatch):

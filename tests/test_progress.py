@@ -53,32 +53,6 @@ def test_lines_of_a_run_become_progress(capsys, clock):
     assert "~42 s left" in shown
 
 
-def test_a_line_of_progress_has_no_gap_and_no_long_number(capsys, clock):
-    with Progress("pack", Forecast(expected=10), show=False) as progress:
-        progress("FDNET grown 1 30")
-    assert capsys.readouterr().err == "", "quiet says nothing"
-    for lines, text in [
-        (["   3581   1369   1.5e-07   0.21"], "pack: step 3581 of ~586812\n"),
-        (["FDNET relaxing 5 2.1234567890123e-15"], "coming to rest, 5 times, energy 2.12e-15 J\n"),
-        (["FDNET grown 3 30"], "pack: step 0 of ~586812, grown 3 of 30\n"),
-        (["FDNET restoring"], ""),
-    ]:
-        with naming(lines, text):
-            with Progress("pack", 586812) as progress:
-                for line in lines:
-                    clock.now += 6
-                    progress(line)
-            assert capsys.readouterr().err.endswith(text)
-            assert text or progress.note == ""
-
-
-def test_a_count_of_steps_beyond_use_has_three_digits(capsys, clock):
-    with Progress("invade", 123456789012345) as progress:
-        clock.now += 6
-        progress("   3581   1369   1.5e-07   0.21")
-    assert "step 3581 of ~1.23e+14" in capsys.readouterr().err
-
-
 def test_the_time_left_of_recorded_runs_is_within_a_factor_of_two(clock):
     """Later steps are slower, as more fines are there: the last third decides."""
     for forecast, crossed, chunk in [WELL, SPECIMEN5]:

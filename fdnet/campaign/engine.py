@@ -27,8 +27,8 @@ from fdnet.run.folder import MANIFEST, RECORDS
 from fdnet.run.progress import ONE_CORE
 
 PAUSE, PATIENCE = 0.05, 120.0
-ENGINES = ("local", "snakemake", "slurm")
 """Seconds between two looks at the runs, and seconds that they may take to stop in good order."""
+ENGINES = ("local", "snakemake", "slurm")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

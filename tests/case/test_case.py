@@ -4,19 +4,17 @@ import copy
 import csv
 import datetime
 import hashlib
-import math
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
 from builders import TINY, naming, tiny
 
-from fdnet.case.case import KEYS, Case, InvasionCase, difference_text, with_fines
+from fdnet.case.case import KEYS, Case, InvasionCase, with_fines
 from fdnet.case.file import case_from, known_keys, read_case, set_keys
 from fdnet.cli import main
 from fdnet.errors import CaseError
-from fdnet.run.folder import RunFolder, mark_folder, open_folder
+from fdnet.run.folder import mark_folder
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
 
 
@@ -100,21 +98,6 @@ def test_a_bad_value_is_named_with_its_path():
             assert expected in problems(changed(**{part: values}))
 
 
-def test_a_bad_key_silences_only_the_rules_that_read_it():
-    """`grains.radius_mm` cannot be compared with anything, the two ways to supply fines can."""
-    text = problems(changed(grains={"radius_mm": -1.0}, fines={"radius_mm": 0.3, "slab_mm": 2.0}))
-    assert "grains.radius_mm: -1.0" in text
-    assert "not below" not in text
-    assert "give exactly one of the two" in text
-    for part, values in (("fines", {"count": True}), ("grains", {"count": 66.0})):
-        assert "1 problem:" in problems(changed(**{part: values})), part
-    data = changed(fines={"radius_mm": 0.3}, drag={"field": "network"}, run={"cap_ms": True})
-    text = problems(data)
-    assert "3 problems: run.cap_ms: True" in text
-    assert " | fines.radius_mm: 0.3 is not below grains.radius_mm 0.25" in text
-    assert " | drag.upstream: 'interstitial', but with drag.field" in text
-
-
 def test_a_case_without_fines_is_a_type_of_its_own():
     bare = case_from({key: value for key, value in TINY.items() if key != "fines"})
     assert type(bare) is Case
@@ -147,13 +130,6 @@ def test_every_table_is_written():
     assert "grains.porosity: missing" in problems({**TINY, "grains": {"radius_mm": 0.25}})
 
 
-def test_toml_comes_back_as_the_same_case():
-    case = tiny("grains.radius_mm=[0.2,0.25]", "analysis.law=thesis")
-    again = case_from(tomllib.loads(case.toml()))
-    assert again == case
-    assert again.digest() == case.digest()
-
-
 def test_stages_depend_only_on_their_own_keys():
     """The neighbour search changes the order of sums: another invasion of the same pack."""
     for key, stages in {
@@ -172,14 +148,6 @@ def test_stages_depend_only_on_their_own_keys():
 
 
 DIGESTS = ("pack", "invade", "analyse")
-
-
-def test_analysis_choices_reach_the_analysis():
-    """One class holds them, with the names of the keys; the default walls hold the fluid."""
-    assert tiny().analysis.walls == "no-slip"
-    options = tiny("analysis.walls=slip", "analysis.sections=3", "analysis.law=thesis").analysis
-    assert (options.walls, options.sections, options.law) == ("slip", 3, "thesis")
-    assert "analysis.walls: 'sticky'" in problems(changed(analysis={"walls": "sticky"}))
 
 
 def test_set_reads_values_as_toml_and_refuses_nonsense():
@@ -236,36 +204,6 @@ def test_shipped_cases_keep_their_digests_and_their_text(root: Path):
             **{stage: case.digest(stage) for stage in ("pack", "invade", "analyse")},
             "text": hashlib.sha256(text.encode()).hexdigest()[:16],
         }
-
-
-def test_values_in_si_are_those_of_the_keys():
-    case = tiny(
-        "box.sides=periodic",
-        "fines={radius_mm=0.05, slab_mm=0.7}",
-        "fluid.darcy_length_mm=3.3",
-        "run={cap_ms=0.3, plug_time_ms=0.2, checkpoint_ms=0.1}",
-        "run.skin_mm=0.04",
-        "run.neighbour_bin_mm=0.2",
-    )
-    assert case.size_m == case.box.size_m == pytest.approx((3e-3, 1.6e-3, 1.6e-3))
-    assert case.periodic == (False, True, True)
-    assert case.grains.radius_range_m == pytest.approx((2.5e-4, 2.5e-4))
-    assert case.fines.slab_m == pytest.approx(7e-4)
-    assert case.fluid.viscosity_Pa_s == pytest.approx(0.05)
-    assert case.fluid.stokes_coefficient_Pa_s == pytest.approx(6 * math.pi * 0.05)
-    assert case.fluid.darcy_length_m == pytest.approx(3.3e-3)
-    assert case.fluid.overbalance_Pa == pytest.approx(3.5e6)
-    well = tiny(
-        "well={radius_mm=108.0, drainage_radius_m=9.0, formation_permeability_mD=2.0}"
-    ).well
-    assert well.radius_m == pytest.approx(0.108)
-    assert well.formation_permeability_m2 == pytest.approx(1.9738466e-15)
-    assert case.analysis.profile_bin_m == pytest.approx(2.5e-4)
-    run = case.run
-    assert (run.cap_s, run.plug_time_s, run.checkpoint_s) == pytest.approx((3e-4, 2e-4, 1e-4))
-    assert (run.skin_m, run.neighbour_bin_m) == pytest.approx((4e-5, 2e-4))
-    assert tiny().run.duration_s is tiny().fines.slab_m is tiny().fluid.darcy_length_m is None
-    assert tiny("run.duration_ms=2.0").run.duration_s == pytest.approx(2e-3)
 
 
 def test_a_box_for_more_grains_than_memory_is_refused():
@@ -388,15 +326,6 @@ def test_a_run_of_another_case_is_refused_with_the_keys_that_differ(tmp_path, ca
     assert "max_hours" not in error
 
 
-def test_what_differs_between_two_cases_is_named_by_key():
-    mine = tiny("grains.friction=0.3", "run.on_overlap=stop")
-    assert difference_text(mine, tiny().data()) == "grains.friction = 0.55 there, 0.3 here"
-    assert difference_text(tiny(), tiny().data()) == ""
-    many = tiny(*(f"fluid.{key}=2.0" for key in ("viscosity_cP", "density_kg_m3")), "seed=9",
-                "fines.count=7", "grains.count=50", "analysis.sections=2")  # fmt: skip
-    assert difference_text(many, tiny().data()).endswith(", and 2 more keys")
-
-
 def test_every_command_explains_itself(capsys):
     def screen(*words: str) -> str:
         with pytest.raises(SystemExit) as ended:
@@ -420,27 +349,6 @@ NETWORK = ("drag.field=network", "drag.upstream=darcy", "drag.scheme=implicit")
 
 
 LIFTED = ("clean_up.drawdown_MPa=1.0",)
-
-
-RECORD = {
-    "format": 1,
-    "ranks": 1,
-    "files": {"post/gone.dump": "0" * 64},
-    "seconds": 1.0,
-    "max_overlap": 0.0,
-    "steps": 1,
-    "dt_s": 1e-7,
-    "runs": [{"version": "3.8.0", "seconds": 1.0}],
-    "left_out": [],
-    "porosity": 0.4,
-    "porosity_assumed": 0.4,
-    "attempts": [{"liggghts_s": 1.0}],
-    "stop_reason": "cap",
-    "physical_time_s": 1.0,
-    "supplied": 1,
-    "warnings": [],
-}
-"""A record of any stage, but for its digest."""
 
 
 PERIODIC = ("box.sides=periodic",)
@@ -467,28 +375,3 @@ def test_walls_count_where_the_fluid_is_made_with_them():
     ]:
         with naming(keys, stages):
             assert moved_by(*keys) == {*stages, "analyse"}
-
-
-def with_stages(case: Case, path, *stages: str) -> RunFolder:
-    """A run folder in which `stages` are done, by their records."""
-    folder = open_folder(path, case, stages=stages, resume=False, force=False)
-    for stage in stages:
-        (path / stage).mkdir()
-        folder.finish(stage, RECORD | {"digest": case.digest(stage)})
-    folder.complete(None)
-    folder.close()
-    return folder
-
-
-def test_force_keeps_no_invasion_made_with_other_walls(tmp_path):
-    for number, keys in enumerate([NETWORK, (*NETWORK, *LIFTED)]):
-        folder_ = tmp_path / str(number)
-        folder_.mkdir()
-        with naming(keys):
-            case, path = tiny(*keys), folder_ / "run"
-            with_stages(case, path, "pack", "invade")
-            later = tuple(stage for stage in case.stages if stage not in ("pack", "invade"))
-            slip = tiny(*keys, "analysis.walls=slip")
-            with pytest.raises(CaseError, match="invade: belongs to another case; add invade"):
-                open_folder(path, slip, stages=later, resume=False, force=True)
-            open_folder(path, case, stages=later, resume=False, force=True).close()

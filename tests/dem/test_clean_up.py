@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from builders import resting_spheres, tiny
+from builders import tiny
 from cut_and_continue import StopError
 
 from fdnet.case.file import case_from
@@ -20,24 +20,18 @@ from fdnet.dem.clean_up import (
     render_clean_up,
     turned_drag,
 )
-from fdnet.dem.invade_deck import Moment
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
-from fdnet.run.clean_up import fluid_turned_back
 from fdnet.run.dem_stages import invaded, packed_grains
 from fdnet.run.folder import open_folder
 from fdnet.run.pipeline import RunOptions, run_stages
 from fdnet.run.records import Session
 from fdnet.scales.scales import back_flow, scales_of
-from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
 
 
 STAGES = ("pack", "invade", "clean_up", "analyse")
-
-
-CROWD = ("drag.crowd=beetstra", "drag.scheme=implicit")
 
 
 def small(*more):
@@ -52,16 +46,6 @@ def small(*more):
         "clean_up.drawdown_MPa=1.0",
         *more,
     )
-
-
-def fines_at(x):
-    """Two grains and a fine at rest at each x (m)."""
-    box = np.array([[0.0, 2e-3], [0.0, 1.2e-3], [0.0, 1.2e-3]])
-    grains = resting_spheres(
-        [[3e-4, 6e-4, 6e-4], [9e-4, 6e-4, 6e-4]], 2.5e-4, box, kind=Kind.GRAIN
-    )
-    place = [[one, 6e-4, 6e-4] for one in x]
-    return grains.joined(resting_spheres(place, 5e-5, box, kind=Kind.FINE, first=3))
 
 
 @pytest.fixture(scope="module")
@@ -119,14 +103,6 @@ def test_what_came_out_and_what_stays_is_what_was_there(run):
     assert damaged < summary["return_k_over_k0"] <= 1.0
 
 
-def test_a_finished_clean_up_is_not_repeated(run):
-    folder, summary = run
-    stamp = (folder / "clean_up" / "log.liggghts").stat().st_mtime_ns
-    options = RunOptions(out=folder, show_progress=False, stages=STAGES)
-    assert run_stages(small(), options) == summary
-    assert (folder / "clean_up" / "log.liggghts").stat().st_mtime_ns == stamp
-
-
 def cut_everywhere(start, folder, binary, scheme, ranks):
     """Cut the clean-up at every checkpoint; it goes on bit for bit, on its number of ranks."""
     keys = (f"drag.scheme={scheme}", "drag.pressure_gradient=true", "clean_up.duration_ms=1.0")
@@ -171,7 +147,8 @@ def test_a_run_cut_in_a_later_stage_gives_the_summary_of_the_uncut_one(run, tmp_
             shutil.rmtree(path) if path.is_dir() else path.unlink()
         (tmp_path / name / ".unfinished").touch()
         out = RunOptions(out=tmp_path / name, show_progress=False, stages=STAGES, resume=True)
-        assert {**run_stages(small(), out), "seconds": None} == {**first, "seconds": None}, name
+        measured = dict.fromkeys(("seconds", "cpu_seconds", "peak_memory_bytes"))
+        assert run_stages(small(), out) | measured == first | measured, name
 
 
 def test_a_record_keeps_restarts_of_later_checkpoints(tmp_path):
@@ -253,15 +230,3 @@ def test_a_missing_restart_is_named(start, tmp_path, binary):
         CaseError, match=r"invade_\d+\.restart: the clean-up begins with this file"
     ):
         again(start, back_flow(small()), tmp_path, binary)
-
-
-def test_the_mud_side_has_the_upstream_velocity_in_a_crowd_turned_back():
-    """As in the deck of lone fines: Darcy's upstream of the face, that of the pores elsewhere."""
-    flow = back_flow(small(*CROWD, "drag.upstream=darcy"))
-    spheres = fines_at([-2e-4, -1e-6, 1e-6, 6e-4, 1.999e-3, 2.1e-3])
-    fluid = fluid_turned_back(flow, spheres.grains())
-    moment = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
-    made = fluid.forces(spheres, moment).velocity[:, 0]
-    assert flow.scales.upstream_velocity < 0.6 * flow.scales.drive_velocity
-    assert made[:2] == pytest.approx(-flow.scales.upstream_velocity, rel=1e-12)
-    assert made[2:] == pytest.approx(-flow.scales.drive_velocity, rel=1e-12)

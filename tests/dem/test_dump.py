@@ -73,10 +73,3 @@ def test_broken_files_are_named_by_line_and_step(tmp_path: Path):
     (tmp_path / "d").write_text("")
     with pytest.raises(DumpError, match="0 frames, expected one"):
         read_frame(tmp_path / "d")
-
-
-def test_every_cut_of_a_file_is_noticed():
-    text = frame(3, ["1 1 0.5 ", "2 1 0.25 "]).encode()
-    for length in range(1, len(text)):
-        with pytest.raises(DumpError):
-            list(parse_dump(text[:length], "cut"))

@@ -1,21 +1,18 @@
 """The fluid that answers for its fines: crowds, and the flow of the network after its deposit."""
 
 import itertools
-import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from builders import TINY, followed, resting_spheres, tiny
-from scipy.integrate import quad
 
 from fdnet.case.file import case_from
 from fdnet.dem.deck import snapshot_of, specimen_box, write_data
 from fdnet.dem.invade_deck import (
     FluidForces,
     Moment,
-    drag_rate,
     fine_density,
     largest_share,
     read_state,
@@ -23,31 +20,23 @@ from fdnet.dem.invade_deck import (
     write_forces,
     write_parts,
 )
-from fdnet.dem.invasion import invade, steps_between
+from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, find_binary, run_deck
 from fdnet.dem.supply import batches_of, densities
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.network.field.field import velocity_field
-from fdnet.network.flow.flow import solve_flow
-from fdnet.network.laws.named import LAWS
-from fdnet.network.network import build_network
 from fdnet.run.fluid import Movers, NetworkFluid, fluid_of, history_rows, mean_ahead
 from fdnet.run.network_flow import (
     Renewal,
-    bed_section,
-    changed_share,
     on_each_fine,
     pore_through,
 )
 from fdnet.scales.scales import scales_of
-from fdnet.scales.table import scale_rows
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
-from tests.network.packs import random_pack
 
 pytestmark = pytest.mark.liggghts
 LAUNCH = Launch(binary=find_binary())
-FINE = "fines.radius_mm=0.0125"
 FIRST = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
 
 
@@ -92,26 +81,6 @@ def with_case(fluid, *more, scales=None, **way):
 
 def deposit_of(done) -> Snapshot:
     return replace(done.damaged.fines(), velocity=np.zeros((len(done.damaged.fines()), 3)))
-
-
-def test_the_way_of_each_fine_follows_its_own_density(fluid):
-    """Light and heavy fines go as in muds of their own kind."""
-    velocity = (3.0 * fluid.first_velocity, fluid.first_velocity, 0.0)
-    place = np.random.default_rng(1).random((40, 3)) * 1e-3
-    moving = fluid.grains.joined(fines(place, 1e-5, fluid.grains.box, velocity))
-    density = np.repeat([500.0, 8000.0], 20)
-    mixed = way_of(fluid.forces(moving, replace(FIRST, density=density)))
-    light, heavy = (
-        way_of(with_case(fluid, key, scales=fluid.scales).forces(moving, FIRST))
-        for key in ("fines.density_kg_m3=500.0", "fines.density_kg_m3=8000.0")
-    )
-    assert mixed == pytest.approx(np.concatenate([light[:20], heavy[20:]]), rel=1e-9, abs=1e-9)
-    assert not np.allclose(light, heavy, rtol=0.1)
-
-
-def way_of(forces) -> np.ndarray:
-    """The fluid on the way of each fine, over the superficial velocity."""
-    return forces.velocity / forces.measures["velocity_m_s"]
 
 
 def test_batches_come_as_the_mud_that_slows_down_carries_them(go, fluid, tmp_path):
@@ -159,22 +128,6 @@ def test_pores_carry_what_enters_them(fluid):
         sign = np.sign(x[second] - x[first])
         flux = (pack.flow.throat_flux * sign)[crossing].sum()
         assert flux == pytest.approx(pack.flow.inflow, rel=1e-6)
-
-
-def test_pores_at_walls_carry_half_of_all_that_crosses_their_throats():
-    """As much comes in as goes out, also where a throat has one half or one quarter in the box."""
-    pack = random_pack(60, 0.5, periodic=False)
-    network = build_network(pack, periodic=(False,) * 3, walls="no-slip")
-    flow = solve_flow(network, LAWS["lubrication"](network))
-    pair = network.pore_group[network.throat_pores]
-    passed = np.where(pair[:, 0] == pair[:, 1], 0.0, 0.5 * np.abs(flow.throat_flux))
-    half = sum(np.bincount(pair[:, end], passed, len(network.pore_group)) for end in (0, 1))
-    at_wall = np.zeros(len(network.pore_group), bool)
-    at_wall[pair[network.throat_share < 1.0]] = True
-    some = at_wall[network.pore_group] & (np.abs(flow.pore_pressure - 0.5) < 0.49)
-    assert np.count_nonzero(some) > 50
-    through = half[network.pore_group] / flow.inflow
-    assert pore_through(network, flow)[some] == pytest.approx(through[some], rel=1e-6)
 
 
 def test_the_overbalance_is_the_first_drop_of_pressure(fluid):
@@ -274,31 +227,6 @@ def test_the_balance_holds_while_fines_move_at_another_pace_than_the_fluid(fluid
         assert (row["rate_over_initial"] < 1.0) == (pace < 1.0)
 
 
-def test_each_pore_gives_all_its_force_to_the_fines_in_it(fluid, done):
-    """So the fines of any part of the pack take up what the network loses to them there."""
-    carried, deposit = carried_with(fluid, deposit_of(done))
-    each = on_each_fine(carried.pressed, deposit)
-    group = fluid.pack.network.pore_group[deposit.pore]
-    held = carried.pressed.groups[np.unique(group)]
-    assert each.sum(axis=0) == pytest.approx(held.sum(axis=0), rel=1e-9)
-    assert each[:, 0].sum() == pytest.approx(carried.pressed.groups[:, 0].sum(), rel=5e-3)
-    some = np.unique(group)[:10]
-    share = np.isin(group, some)
-    pore, fine, volume = (one[share] for one in (deposit.pore, deposit.fine, deposit.volume))
-    part = replace(deposit, pore=pore, fine=fine, volume=volume)
-    alone = on_each_fine(carried.pressed, part)
-    assert alone.sum(axis=0) == pytest.approx(carried.pressed.groups[some].sum(axis=0), rel=1e-9)
-
-
-def test_a_bed_is_pressed_on_the_harmonic_mean_of_its_section(fluid):
-    network, section = fluid.pack.network, bed_section(fluid.pack.network)
-    open_ones = np.flatnonzero((network.throat_area > 0) & (network.throat_heights[:, 0] > 0))
-    for throat in open_ones[:5]:
-        height, narrow = network.throat_heights[throat, 0], network.throat_area[throat]
-        way = quad(lambda z, s=narrow: 1.0 / (s + np.pi * z**2 / 2), 0.0, height)[0]
-        assert section[throat, 0] == pytest.approx(height / way, rel=1e-6)
-
-
 def test_the_fines_take_the_share_of_the_pressure_that_resolved_flow_gives_them(fluid, done):
     """Stokes flow around grains and fines, to a factor of 2: its forces know no network.
 
@@ -325,26 +253,6 @@ def test_what_fines_close_still_carries_the_pressure(fluid):
     total = carried.pressed.grains + carried.pressed.groups.sum(axis=0)
     assert total[0] == pytest.approx(fluid.pack.network.area, rel=1e-6)
     assert carried.pressed.groups[:, 0].sum() > 0.1 * fluid.pack.network.area
-
-
-def test_the_network_is_solved_anew_when_the_deposit_changed(fluid, done):
-    standing = deposit_of(done)
-    renewal = Renewal(fluid.pack)
-    first = renewal.of(standing, anew=False)[0]
-    assert renewal.of(standing, anew=False)[0] is first
-    inner = np.flatnonzero((standing.position[:, 0] > 0) & (standing.position[:, 0] < 1e-3))
-    place = np.array(standing.position)
-    place[inner[0], 2] += 0.9 * standing.radius[0]
-    moved = replace(standing, position=place)
-    assert renewal.of(moved, anew=False)[0] is first
-    assert renewal.deposit.renewed == 1
-    keep = np.ones(len(standing), bool)
-    keep[inner[: len(inner) // 2]] = False
-    assert changed_share(renewal.solved, standing.where(keep)) > 0.1
-    less = renewal.of(standing.where(keep), anew=False)[0]
-    assert less.k_over_k0 > first.k_over_k0
-    assert renewal.of(standing.where(keep), anew=True)[0] is not less
-    assert renewal.solves == 3
 
 
 def test_updates_from_the_former_one_give_what_a_full_one_gives(fluid, done):
@@ -412,30 +320,6 @@ def test_a_slab_at_constant_rate_raises_the_pressure(go, fluid, tmp_path):
     network = first["pressure_pack_Pa"] / last["k_over_k0"]
     assert last["pressure_pack_Pa"] == pytest.approx(network, rel=0.05)
     assert max(row["momentum_defect"] for row in result.updates) <= 0.01
-
-
-def test_the_stiffness_that_a_deposit_needs_is_named_and_holds(go, fluid, tmp_path):
-    """Springs: F = 6 dp pi D^2 / 4 with D^2 = 32 k / phi, and dp = mu U L / k by Darcy."""
-    case, scales = fluid.case, fluid.scales
-    pressure = case.fluid.viscosity_Pa_s * scales.darcy_velocity * 1.6e-3 / scales.permeability
-    force = 6 * pressure * np.pi / 4 * 32 * scales.permeability / scales.porosity
-    stiffness = scales.contacts["grain-fine"].normal_stiffness
-    assert scales.deposit_overlap == pytest.approx(force / stiffness / 1e-4, rel=1e-9)
-    text = " ".join(scales.warnings) + " "
-    asked = re.search(r"hold the whole pressure.*set run\.stiffness_N_m = (\S+?)[,;]? ", text)
-    firm = with_case(fluid, f"run.stiffness_N_m={float(asked[1])}", "run.cap_ms=0.3")
-    assert firm.scales.deposit_overlap <= case.run.max_overlap
-    assert not [text for text in firm.scales.warnings if "whole pressure" in text]
-    assert "overlap in the deposit" in " ".join(row.name for row in scale_rows(case, scales))
-    assert 0.0 < go(firm, tmp_path).max_overlap < 0.05
-    with pytest.raises(CaseError, match="deposit alone would press"):
-        scales_of(followed("run.stiffness_N_m=50", "run.max_overlap=0.4"))
-
-
-def test_no_warning_of_throats_where_the_balance_of_momentum_sees_them():
-    for keys, warned in (((), False), (("drag.field=uniform",), True)):
-        texts = [text for text in scales_of(followed(*keys)).warnings if "throats" in text]
-        assert bool(texts) is warned
 
 
 def test_what_does_not_go_with_the_network_is_refused():
@@ -686,50 +570,3 @@ def test_the_mean_over_the_way_in_a_flow_that_speeds_up():
     assert mean[0, 1:] == pytest.approx(0.0)
     slow = mean_ahead(movers((0.3, 0.0, 0.0), 1e-9), lambda at: a * at, time)
     assert slow[0] == pytest.approx([1.5, 0.0, 0.0]), "one that drag hardly moves stays"
-
-
-def test_a_way_that_leads_into_a_grain_ends_before_it():
-    """The grain begins at x = 1; the fluid before it has the velocity 1 at 0 and 2 at 1."""
-
-    def fluid(at):
-        assert np.all(np.isfinite(at))
-        return np.where(at[:, :1] < 1.0, (1.0 + at[:, :1]) * np.array([1.0, 0.0, 0.0]), 0.0)
-
-    near = mean_ahead(movers((0.0, 0.0, 0.0), TRACER), fluid, 100.0)
-    assert 1.0 <= near[0, 0] < 2.0
-    assert mean_ahead(movers((1.5, 0.0, 0.0), TRACER), fluid, 1.0)[0] == pytest.approx(0.0)
-
-
-def test_updates_at_every_diameter_carry_fines_as_far_as_eight_times_as_many(grains_of):
-    """Fines of 1/20 of a grain cross a pack; the fluid at their place alone holds them back."""
-    case = followed(FINE)
-    scales, grains = scales_of(case), grains_of(case)
-    fluid = NetworkFluid(case=case, scales=scales, grains=grains, standing=0.0)
-    assert gone(fluid, 1.0) == pytest.approx(gone(fluid, 0.125), rel=0.05)
-
-
-def gone(fluid: NetworkFluid, travel: float) -> float:
-    """Mean way of fines through a pack with updates at each `travel` diameters."""
-    case = followed(FINE, f"drag.update_travel={travel}")
-    other = replace(fluid, case=case)
-    other.__dict__["pack"] = fluid.pack
-    place = np.random.default_rng(3).random((400, 3)) * np.array([0.0, 1e-3, 1e-3])
-    start = Snapshot.from_arrays(place, 1.25e-5, box=fluid.grains.box, kind=Kind.FINE)
-    now = replace(start, velocity=np.tile((fluid.first_velocity, 0.0, 0.0), (400, 1)))
-    time, end = 0.0, 4e-4 / fluid.first_velocity
-    moment = replace(FIRST, fresh=False)
-    while time < end:
-        forces = other.forces(fluid.grains.joined(now), moment)
-        rate = drag_rate(now, forces.coefficient, case.fines.density_kg_m3)
-        met = forces.velocity + forces.push / forces.coefficient[:, None]
-        left = steps_between(case, fluid.scales, forces.pace) * fluid.scales.time_step
-        movers = Movers(position=now.position, velocity=now.velocity, rate=rate)
-        after = movers.after(min(left, end - time), met)
-        free = np.any(fluid.pack.shape.at(after.position) != 0.0, axis=1)[:, None]
-        now = replace(
-            now,
-            position=np.where(free, after.position, now.position),
-            velocity=np.where(free, after.velocity, 0.0),
-        )
-        time += left
-    return float(now.position[:, 0].mean())

@@ -1,13 +1,11 @@
 """Invasions by the real binary: every fine is counted, overlaps are seen, the end is said."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from bench import bench
 from builders import resting_spheres, tiny
-from cut_and_continue import StopError
 
 from fdnet.dem import invade_deck
 from fdnet.dem.checkpoint import (
@@ -22,14 +20,11 @@ from fdnet.dem.checkpoint import (
     write_watch_parts,
 )
 from fdnet.dem.deck import number, render_text, specimen_box
-from fdnet.dem.invade_deck import write_invade_inputs
 from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Launch, run_deck
+from fdnet.dem.liggghts import Launch
 from fdnet.dem.supply import batches_of, place_batches
-from fdnet.errors import CaseError, LiggghtsError
-from fdnet.run.pipeline import RunOptions, run_stages
+from fdnet.errors import LiggghtsError
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.geometry import touching_pairs
 from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
@@ -71,10 +66,10 @@ def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(go, tmp_pat
     ("scheme", "forces"),
     [("implicit", ()), ("held", ("drag.inertia=schiller-naumann", "drag.pressure_gradient=true"))],
 )
-def test_a_batched_invasion_accounts_for_every_fine_and_resumes(go, tmp_path, scheme, forces):
+def test_a_batched_invasion_accounts_for_every_fine(go, tmp_path, scheme, forces):
     keys = ("fines.supply=batches", "fines.count=900", "run.checkpoint_ms=0.005")
     case = tiny(*keys, f"drag.scheme={scheme}", "run.cap_ms=0.1", "fines.friction=0.2", *forces)
-    whole, batches = go(case, tmp_path / "whole"), batches_of(case, scales_of(case))
+    whole, batches = go(case, tmp_path), batches_of(case, scales_of(case))
     last = whole.history[-1]
     assert len(batches.counts) > 5
     assert (
@@ -83,18 +78,6 @@ def test_a_batched_invasion_accounts_for_every_fine_and_resumes(go, tmp_path, sc
         == last.upstream + last.invaded + last.passed
     )
     assert whole.max_overlap < (0.15 if forces else 0.1)
-
-    def stop(line: str) -> None:
-        if line.startswith("FDNET checkpoint 4 "):
-            raise StopError
-
-    with pytest.raises(StopError):
-        go(case, tmp_path / "cut", follow=stop)
-    for lost in [*(tmp_path / "cut" / "supply").glob("batch_1?.*")]:
-        lost.unlink()
-    again = go(case, tmp_path / "cut")
-    assert again.history == whole.history
-    assert np.array_equal(again.damaged.position, whole.damaged.position)
 
 
 def test_every_stop_reason_is_told_and_fines_that_pass_are_removed(go, tmp_path):
@@ -131,16 +114,6 @@ def test_a_trickle_may_count_as_plugged(go, tmp_path):
     )
 
 
-def test_fines_of_one_micrometre_invade(go, tmp_path):
-    """A size ratio of 1/250 and steps of 0.1 ns: all are counted, and move with the fluid."""
-    case = tiny("fines={radius_mm=0.001, count=20}", "run={duration_ms=0.02}")
-    result = go(case, tmp_path)
-    fines, velocity = result.damaged.fines(), scales_of(case).interstitial_velocity
-    assert len(fines) == 20
-    assert fines.velocity[:, 0].max() == pytest.approx(velocity, rel=1e-6)
-    assert result.max_overlap < 0.03
-
-
 def test_the_neighbour_search_changes_time_not_motion(go, tmp_path):
     """It changes the order of sums: before chaos grows, positions agree to 1e-6 of a fine."""
     plain = go(tiny("run.duration_ms=0.04"), tmp_path / "plain")
@@ -158,24 +131,6 @@ def test_fixed_grains_do_not_move_and_mobile_ones_do(go, grains_of, tmp_path):
         moved = np.max(np.abs(ends - grains_of(case).position))
         assert (moved > 0) == (motion == "mobile")
         assert moved < 0.2 * 0.25e-3
-
-
-def test_a_begun_invasion_is_not_tried_out_again(tmp_path):
-    """Its fines are placed already: a folder with a checkpoint is not refused for its supply."""
-    keys = ("fines.count=200", "fines.concentration=0.3", "fines.radius_mm=0.2")
-    case, leaves = tiny(*keys), "0.3 leaves"
-    history = tmp_path / "run" / "invade" / "history.csv"
-    history.parent.mkdir(parents=True)
-    options = RunOptions(out=tmp_path / "run", show_progress=False)
-    begun = ",".join(Checkpoint._fields) + "\n"
-    for text, force, message in (
-        (begun, False, leaves),
-        (begun + "1,2,3,4,5,6,7,8\n", False, "holds no fdnet run"),
-        (begun + "1,2,3,4,5,6,7,8\n", True, leaves),
-    ):
-        history.write_text(text)
-        with pytest.raises(CaseError, match=message):
-            run_stages(case, replace(options, force=force))
 
 
 def test_fines_that_vanish_are_an_error(grains_of, tmp_path):
@@ -212,33 +167,6 @@ def test_what_was_seen_is_read_line_by_line(tmp_path):
     assert deepest_of([]) == Deepest(step=0, fraction=0.0)
     cut_watch(tmp_path, 100)
     assert [row.step for row in read_watch(tmp_path)] == [50, 100, 1]
-
-
-def test_in_turn_every_grain_is_watched_with_the_fines_and_none_that_it_touches(
-    binary, grains_of, tmp_path
-):
-    """LIGGGHTS writes which spheres are watched in two rounds of chunks."""
-    case = tiny("run.cap_ms=0.2")
-    grains = grains_of(case)
-    groups = watch_variables(case, scales_of(case), grains)["turns"]
-    deck = write_invade_inputs(case, scales_of(case), grains, tmp_path).text
-    text = deck[: deck.index("region specimen")] + "run 0\n"
-    for chunk in range(1, 2 * groups + 1):
-        text += f"variable chunk equal {chunk}\n" + render_text("watched.in.j2", {})
-        text += f"write_dump watched custom {chunk}.dump id type\n"
-    (tmp_path / "in.turns").write_text(text + 'print "DECK_DONE"\n')
-    run_deck(tmp_path, "in.turns", Launch(binary=binary))
-    pairs, _ = touching_pairs(grains, case.periodic)
-    assert len(pairs) > len(grains)
-    rounds: list[list[int]] = [[], []]
-    for chunk in range(1, 2 * groups + 1):
-        table = np.loadtxt(tmp_path / f"{chunk}.dump", skiprows=9, dtype=int)
-        seen = table[table[:, 1] == 1, 0]
-        assert np.sum(table[:, 1] == 2) == case.fines.count
-        assert not np.any(np.isin(grains.id[pairs], seen).all(axis=1))
-        rounds[(chunk - 1) // groups] += seen.tolist()
-    for watched in rounds:
-        assert sorted(watched) == sorted(grains.id.tolist())
 
 
 def test_the_deck_sees_the_overlap_of_an_impact(tmp_path):
@@ -283,19 +211,3 @@ def test_watching_does_not_move_a_single_bit(go, tmp_path, monkeypatch):
     assert np.array_equal(watched.damaged.position, alone.damaged.position)
     assert watched.overlap == deepest_of(read_watch(tmp_path / "watched"))
     assert watched.max_overlap > alone.max_overlap > 0
-
-
-@pytest.mark.parametrize("motion", ["fixed", "mobile"])
-def test_a_run_past_the_limit_stops_when_asked_and_goes_on_when_told(go, tmp_path, motion):
-    keys = ("run.cap_ms=0.3", "run.max_overlap=0.03", f"grains.motion={motion}")
-    for _ in range(2):
-        with pytest.raises(LiggghtsError, match=r"overlapped by .* at step \d+ .*at checkpoint"):
-            go(tiny(*keys, "run.on_overlap=stop"), tmp_path / "run")
-    whole, again = (go(tiny(*keys), tmp_path / name) for name in ("whole", "run"))
-    assert again.history == whole.history
-    assert np.array_equal(again.damaged.position, whole.damaged.position)
-    assert again.overlap == whole.overlap
-    assert list(read_watch(tmp_path / "run")) == list(read_watch(tmp_path / "whole"))
-    assert again.max_overlap > 0.03
-    slow = ("run.cap_ms=0.2", "fluid.velocity_m_s=1.0", "run.on_overlap=stop")
-    assert 0 < go(tiny(*slow), tmp_path / "slow").max_overlap < 0.03, "it is not stopped"

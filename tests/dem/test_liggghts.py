@@ -169,12 +169,3 @@ def test_a_run_that_floods_its_screen_or_log_is_stopped(fake, tmp_path, monkeypa
     for mode in ("flood", "zeros", "log"):
         with pytest.raises(LiggghtsError, match=r"LIGGGHTS wrote more than 1 MiB into .*; "):
             run(fake, tmp_path, mode, timeout=60.0)
-
-
-def test_one_rank_sets_up_no_daemon_and_no_folder(tmp_path, monkeypatch):
-    """Open MPI takes a third of a second for them, and processes would share the folders."""
-    monkeypatch.setenv("TMPDIR", str(tmp_path / "tmp"))
-    (tmp_path / "tmp").mkdir()
-    (tmp_path / "in.own").write_text('shell ls tmp > seen\nprint "DECK_DONE"\n')
-    run_deck(tmp_path, "in.own", Launch(binary=find_binary()))
-    assert not (tmp_path / "seen").read_text()

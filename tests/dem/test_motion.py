@@ -14,7 +14,6 @@ from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.supply import densities
 from fdnet.scales.clock import relaxation_time
-from fdnet.scales.drag import Crowd, crowd_drag_factor, push_of
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Kind, Snapshot
@@ -77,14 +76,6 @@ def test_a_fine_relaxes_to_the_fluid_as_stokes_has_it(tmp_path):
         ]
         assert errors[0] < 0.5 * 0.01, scheme
         assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.1), scheme
-
-
-def test_the_viscous_split_moves_a_fine_as_drag_at_every_step_does(tmp_path):
-    moved = []
-    for scheme in ("drag.refresh_steps=1", "drag.scheme=viscous"):
-        case = drag_case(scheme, f"run.time_step_s={0.01 * TAU}", "run.stiffness_N_m=500.0")
-        moved.append(along(drive(case, tmp_path / scheme, gap=1e-3, steps=200, every=20)))
-    assert moved[0] == pytest.approx(moved[1], rel=1e-12)
 
 
 @pytest.mark.parametrize("ratio", [0.1, 1.0, 10.0, 100.0])
@@ -164,19 +155,6 @@ def test_no_gradient_acts_in_the_mud(tmp_path):
         assert drift > 1.2 * 0.5
 
 
-def test_a_fine_at_rest_is_pressed_by_drag_and_gradient(tmp_path):
-    """Overlap (6 pi mu r u + V G) / k; the estimate of the scales is that of the largest fine."""
-    case = pushed("drag.scheme=viscous")
-    scales = scales_of(case)
-    frames = drive(case, tmp_path / "run", gap=1e-8, steps=20_000, every=20_000)
-    stiffness = scales.contacts["grain-fine"].normal_stiffness
-    force = 6 * math.pi * 0.05 * RADIUS * 0.5
-    force += 4 / 3 * math.pi * RADIUS**3 * 0.05 * 0.5 * scales.porosity / scales.permeability
-    assert push_of(case, 0.5, scales.pressure_gradient).force(RADIUS) == pytest.approx(force)
-    assert along(frames, "x")[-1] - TOUCHES == pytest.approx(force / stiffness, rel=1e-4)
-    assert scales.drag_overlap == pytest.approx(force / stiffness / (2 * RADIUS))
-
-
 def test_drag_at_a_finite_reynolds_number_relaxes_as_schiller_and_naumann_have_it(tmp_path):
     """dv/dt = (u - v) (1 + 0.15 Re^0.687) / tau, by quadrature of time over speed."""
     reynolds, tau = 1095 * 2 * RADIUS * 8.0 / 5e-3, 10 * TAU
@@ -200,37 +178,6 @@ def test_drag_at_a_finite_reynolds_number_relaxes_as_schiller_and_naumann_have_i
         assert along(frames)[-1] > 2 * 8.0 * (1 - math.exp(-at[-1] / tau)), "Stokes's is slower"
 
 
-def test_the_forces_on_a_dense_bed_add_up_to_its_pressure_drop(tmp_path):
-    """150 held fines at a porosity of 0.40: the sum of the dumped forces is G A L within 1 %.
-
-    The drag coefficient is that of Beetstra's law beside the gradient of Carman and Kozeny's.
-    """
-    factor = 0.4 * float(crowd_drag_factor(Crowd(porosity=0.4)))
-    volume = 150 * 4 / 3 * math.pi * RADIUS**3 / 0.6
-    for scheme in ("held", "viscous"):
-        case = tiny(
-            f"drag={{multiplier={factor}, scheme={scheme!r}}}",
-            "grains={radius_mm=0.0500001, porosity=0.4}",
-            f"box.size_mm=[{1e3 * volume / 0.5e-3**2}, 0.5, 0.5]",
-            "fines={radius_mm=0.05, count=150}",
-            "fluid.velocity_m_s=0.01",
-        )
-        size = np.array(case.size_m)
-        grid = np.stack(np.meshgrid(*[(np.arange(n) + 0.5) / n for n in (6, 5, 5)], indexing="ij"))
-        box = np.column_stack([np.zeros(3), size])
-        place = (grid.reshape(3, -1).T * size).tolist()
-        fines = resting_spheres(place, RADIUS, box, kind=Kind.FINE, first=2)
-        grain = resting_spheres([(size / 2).tolist()], RADIUS, box, kind=Kind.GRAIN)
-        alone = "neigh_modify exclude group all all\n" + drag_text(case)
-        run = {"step": 1e-8, "steps": 1, "every": 1, "commands": alone, "moving": "grains"}
-        last = bench(case, grain.joined(fines), tmp_path / scheme, density=2146.0, **run)[-1]
-        forces, gradient = last.column("fx")[1:], scales_of(case).pressure_gradient
-        assert len(forces) == 150
-        assert np.sum(forces) == pytest.approx(gradient * volume, rel=0.01), scheme
-        single = 6 * math.pi * 0.05 * RADIUS * 0.01 * factor
-        assert np.sum(forces) - 150 * single == pytest.approx(0.6 * gradient * volume), scheme
-
-
 # ------------------------------------------------------------------------------------------------
 # Gravity, in whole invasions.
 
@@ -246,29 +193,6 @@ def fallen(case: Case, binary, folder: Path) -> tuple[Snapshot, float]:
     result = invade(case, scales, lonely, folder, Launch(binary=binary))
     assert result.stop_reason == "duration"
     return result.damaged, result.history[-1].step * scales.time_step
-
-
-def test_a_fine_settles_along_an_oblique_gravity(binary, tmp_path):
-    """v(t) = u + v_T (1 - exp(-t / tau)), v_T = 2 r^2 (rho - rho_f) g / (9 mu), in each axis.
-
-    In m/s2 across all axes, so that a fine settles within a millimetre (Stokes 1851).
-    """
-    pull = np.array([1.2e4, -0.9e4, -2.0e4])
-    for scheme in SCHEMES:
-        case = tiny(
-            "fines.count=1",
-            f"drag.scheme={scheme}",
-            "gravity.mode=on",
-            f"gravity.acceleration_m_s2={pull.tolist()}",
-            "box.size_mm=[3.0,3.0,3.0]",
-            "fluid.velocity_m_s=2.0",
-            "run={duration_ms=0.06, checkpoint_ms=0.06}",
-        )
-        spheres, elapsed = fallen(case, binary, tmp_path / scheme)
-        terminal = 2 * RADIUS**2 * (2146 - 1095) * pull / (9 * 0.05)
-        expected = np.array([2.0, 0, 0]) + terminal * (1 - math.exp(-elapsed / TAU))
-        near = pytest.approx(expected, abs=0.005 * np.linalg.norm(terminal))
-        assert spheres.fines().velocity[0] == near, scheme
 
 
 PULL = np.array([60.0, -45.0, -100.0])

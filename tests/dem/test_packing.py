@@ -94,13 +94,6 @@ def test_radii_that_the_case_does_not_ask_for_are_refused(tmp_path):
             check_radii(replace(grains, radius=radius), case, tmp_path)
 
 
-def test_count_overrides_porosity(packed):
-    pack = packed("grains={radius_mm=0.25, porosity=0.9, count=66}")
-    assert len(pack.grains) == 66
-    solid = 66 * 4 / 3 * math.pi * 0.25**3 / (3.0 * 1.6 * 1.6)
-    assert pack.porosity_sum == pytest.approx(1 - solid, rel=1e-9)
-
-
 def test_what_cannot_be_packed_is_an_error_with_what_can(packed):
     small = "box.size_mm=[1.2,1.2,1.2]"
     for keys, message in (

@@ -4,10 +4,6 @@ import json
 import os
 import shutil
 import signal
-import subprocess
-import sys
-import textwrap
-import time
 from importlib import metadata
 from itertools import product
 from pathlib import Path
@@ -15,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import followed, tiny
-from cut_and_continue import MATRIX, StopError, cell_case, differences
+from cut_and_continue import MATRIX, cell_case, differences
 
 from fdnet.dem.checkpoint import UPDATES, Checkpoints, file_digest, read_history, read_updates
 from fdnet.dem.invasion import invade, steps_between
@@ -129,21 +125,6 @@ def test_a_checkpoint_that_is_not_as_recorded_is_passed_over(done, tmp_path, kin
         assert points(folder).last() == before, spoil.__name__
 
 
-def test_dumps_that_lost_rows_and_empty_restarts_are_passed_over(go, cut):
-    folder, whole = cut
-    last, before = whole.history[-1], whole.history[-2]
-    dump = folder / "post" / f"invade_{last.step}.dump"
-    text = dump.read_bytes().replace(
-        b"ITEM: NUMBER OF ATOMS\n300\n", b"ITEM: NUMBER OF ATOMS\n299\n"
-    )
-    for spoilt in (dump.read_bytes()[:-40], text[: text.rstrip(b"\n").rindex(b"\n") + 1]):
-        dump.write_bytes(spoilt)
-        assert points(folder).last() == before
-    (folder / "post" / f"invade_{before.step}.restart").write_bytes(b"")
-    assert points(folder).last() is None
-    assert same(go(CASE, folder), whole)
-
-
 def test_a_restart_cut_by_a_full_disk_is_set_aside(go, cut):
     folder, whole = cut
     rows = (folder / "history.csv").read_text().splitlines(keepends=True)
@@ -164,22 +145,6 @@ def test_a_zeroed_restart_is_passed_over_with_a_warning(go, cut):
     assert same(again, whole)
     (new,) = set(again.warnings) - set(whole.warnings)
     assert f"went on from the checkpoint at step {whole.history[-2].step}" in new
-
-
-def test_the_warning_stays_when_the_continuing_session_is_killed_too(go, cut):
-    folder, whole = cut
-    zeros(folder / "post" / f"invade_{whole.history[-1].step}.restart")
-
-    def stop(line: str) -> None:
-        if line.startswith("FDNET checkpoint"):
-            raise StopError
-
-    with pytest.raises(StopError):
-        go(CASE, folder, timeout=60.0, follow=stop)
-    again = go(CASE, folder, timeout=60.0)
-    assert same(again, whole)
-    (new,) = set(again.warnings) - set(whole.warnings)
-    assert "went on from the checkpoint" in new
 
 
 def test_notes_between_the_checkpoints_are_passed_over_and_kept(go, cut):
@@ -344,34 +309,6 @@ def test_liggghts_that_is_killed_is_reported_and_the_run_goes_on_bit_for_bit(
     again = go(small(), tmp_path)
     assert same(again, whole)
     assert again.updates == whole.updates
-
-
-ORPHAN = """
-import sys
-from pathlib import Path
-from fdnet.dem.liggghts import find_binary
-from fdnet.dem.liggghts import run_deck
-from fdnet.dem.liggghts import Launch
-
-def play(feed):
-    print("started", feed.process.pid, flush=True)
-    feed('shell sleep 0.1', 'print "alive"')
-    sys.stdin.read()
-
-run_deck(Path(sys.argv[1]), "in.none", Launch(binary=find_binary()), play)
-"""
-
-
-def test_liggghts_ends_when_fdnet_is_killed(tmp_path):
-    command = [sys.executable, "-c", textwrap.dedent(ORPHAN), str(tmp_path)]
-    parent = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    child = int(parent.stdout.readline().split()[1])
-    parent.kill()
-    parent.wait()
-    deadline = time.monotonic() + 10
-    while Path(f"/proc/{child}").exists() and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert not Path(f"/proc/{child}").exists()
 
 
 def test_what_goes_wrong_while_liggghts_waits_is_reported(binary, tmp_path):

@@ -89,16 +89,6 @@ def test_every_fine_finds_a_place_up_to_the_sure_crowding(sides):
         refuse_crowded_supply(full, scales_of(full))
 
 
-def test_crowding_is_the_concentration_where_walls_and_larger_fines_shut_nothing():
-    share = tiny().fines.concentration
-    assert crowding(tiny("box.sides=periodic")) == pytest.approx(share)
-    assert crowding(tiny()) == pytest.approx(share * (1.6 / 1.5) ** 2)
-    radius = np.linspace(0.02, 0.06, 100_001)
-    shut = np.mean((0.06 + radius) ** 3) / (8 * np.mean(radius**3))
-    case = tiny("box.sides=periodic", "fines.radius_mm=[0.02,0.06]")
-    assert crowding(case) == pytest.approx(share * shut, rel=1e-4)
-
-
 @pytest.mark.parametrize(("concentration", "seed"), [(0.25, 0), (0.3, 1)])
 def test_a_slab_of_2000_fines_holds_all_that_a_case_may_ask_for(concentration, seed):
     """Rounds of draws alone leave 1 and some 70 of them without a place."""
@@ -163,37 +153,6 @@ def test_a_batch_enters_before_it_could_meet_the_cake(concentration):
         assert nearest >= cake + (batches.length if chunk > 0 else 0) - 1e-15
     entered = [end - fines.position[:, 0].min() for fines in place_batches(case, scales, grains)]
     assert max(entered) <= batches.reach + 1e-15
-
-
-def test_batches_follow_the_mud_where_it_slows_down():
-    """After the travel of n chunks of undisturbed mud the batches of chunk n + 1 are there."""
-    batches = batches_of(tiny(*BATCHED), scales_of(tiny(*BATCHED)))
-    assert [batches.entered_at(chunk) for chunk in (1, 2, 5)] == [2, 3, 6]
-    assert batches.supplied(batches.entered_at(10_000)) == 900
-    moved = batches.travel * np.array([0.0, 0.99, 1.0, 1.5, 2.0, 1e6])
-    assert [batches.entered_after(one) for one in moved] == [2, 2, 3, 3, 4, len(batches.counts)]
-    for entered in (2, 3, len(batches.counts)):
-        assert batches.entered_with(batches.supplied(entered)) == entered
-        assert batches.entered_with(batches.supplied(entered) - 1) == entered
-    assert batches.entered_with(0) == 2
-    assert batches.entered_with(10_000) == len(batches.counts)
-
-
-def test_thin_chunks_make_no_batch_thinner_than_a_fine():
-    """Otherwise batches that are not neighbours could overlap: each is drawn clear of the last."""
-    case = tiny("fines.supply=batches", "run.checkpoint_ms=0.0005")
-    scales, grains = scales_of(case), one_grain(case)
-    assert batches_of(case, scales).travel < 0.2 * 2 * 0.05e-3
-    place = np.concatenate([place for _, place in in_the_slab(case, scales, grains)])
-    apart = np.linalg.norm(place[:, None] - place, axis=2) + np.eye(len(place))
-    assert apart.min() >= CLEARANCE * 0.1e-3 * (1 - 1e-12)
-
-
-def test_a_short_slab_or_a_few_fines_are_one_batch():
-    few = "fines={radius_mm=0.05, count=60, supply='batches', concentration=0.0003}"
-    for keys in ((few, "run.checkpoint_ms=0.01"), ("fines.supply=batches", "fines.count=20")):
-        case = tiny(*keys)
-        assert batches_of(case, scales_of(case)).counts == (case.fines.count,)
 
 
 # ------------------------------------------------------------------------------------------------

@@ -1,6 +1,5 @@
 """Movies, and the flow at the states of a run: in order, with their times, and what is refused."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from fdnet.errors import CaseError
 from fdnet.report import picture as pictures
 from fdnet.report.picture import LAST_FRAMES, MovieFrame, Scene, write_movie
 from fdnet.run import movie
-from fdnet.run.movie import LINES, colour_limits, flux_of, moments_of, movie_of, streamlines_of
+from fdnet.run.movie import LINES, flux_of, movie_of, streamlines_of
 
 BOX = np.array([[0.0, 4e-3], [0.0, 2e-3], [0.0, 2e-3]])
 
@@ -51,20 +50,6 @@ def test_a_gif_shows_the_states_in_order_and_stays_on_the_last(tmp_path, monkeyp
             seen.append(picture.convert("L").getpixel((700, 400)))
     assert total == 250 * (len(GREYS) + LAST_FRAMES)
     assert list(dict.fromkeys(seen)) == pytest.approx(GREYS, abs=3)
-
-
-def test_a_png_has_the_states_below_each_other_with_the_flow_of_each(tmp_path, monkeypatch):
-    monkeypatch.setattr(pictures, "draw_frames", drawn)
-    frames = [
-        MovieFrame(spheres=tmp_path / f"{n}.vtp", words=f"{n}", lines=tmp_path / f"flow_{n}.vtp")
-        for n in range(2)
-    ]
-    scene = scene_of(tmp_path, title="flux", limits=(0.1, 10.0))
-    path = write_movie(tmp_path / "m.png", frames, scene, per_second=4.0)
-    with Image.open(path) as picture:
-        width, height = picture.size
-        seen = [picture.convert("L").getpixel((width // 2, height * n // 4)) for n in (1, 3)]
-    assert seen == pytest.approx(GREYS[:2], abs=3)
 
 
 def test_what_makes_no_movie_leaves_no_file(tmp_path, monkeypatch):
@@ -143,28 +128,6 @@ def test_a_movie_shows_the_states_of_its_run_alone(copied, tmp_path, shown):
 
 
 @pytest.mark.liggghts
-def test_a_cut_state_is_named_and_not_drawn_empty(copied, tmp_path, shown):
-    """Also in a run whose manifest has no digests of its states."""
-    path, file = a_frame(copied), copied / "manifest.json"
-    whole, manifest = path.read_bytes(), json.loads(file.read_text())
-    files = {k: v for k, v in manifest["files"].items() if not k.startswith("frames/")}
-    for kept in (manifest["files"], files):
-        file.write_text(json.dumps(manifest | {"files": kept}))
-        for cut in (whole[:3000], b"", whole[:-20], None):
-            path.unlink()
-            if cut is None:
-                path.mkdir()
-            else:
-                path.write_bytes(cut)
-            with naming(len(kept), cut and len(cut)), pytest.raises(CaseError, match=path.name):
-                movie_of(copied, tmp_path / "m.gif")
-            if cut is None:
-                path.rmdir()
-                path.touch()
-    assert not shown
-
-
-@pytest.mark.liggghts
 def test_a_movie_of_a_changed_run_is_refused(copied, tmp_path, shown):
     for name in ("frames", "spheres_initial.vtp", "history.csv", "profile.csv"):
         path = a_frame(copied) if name == "frames" else copied / name
@@ -225,17 +188,3 @@ def test_the_command_draws_before_and_after(finished, tmp_path, capsys):
         upper, lower = np.array_split(np.asarray(picture.convert("RGB"), float), 2)
     fines = [np.mean(part @ [1.0, 0.0, -1.0] > 150.0) for part in (upper, lower)]
     assert fines[0] < 1e-4 < 1e-3 < fines[1], "the clean sand holds no orange fine"
-
-
-@pytest.mark.liggghts
-def test_words_say_what_is_known(finished):
-    clean, *_, last = moments_of(finished)
-    assert (clean.rate, last.rate) == (None, None), "a uniform flow has no rate of its own"
-    assert clean.words() == "clean sand"
-    limits = colour_limits(np.array([0.0, 1e-9, 4.1]))
-    assert limits == pytest.approx((0.05, 5.0)), "colours end at the largest values"
-    invaded = finished.summary["invaded_count"]
-    assert last.words(measured=0.5) == (
-        f"{1e3 * finished.summary['physical_time_s']:.3g} ms,   k/k0 0.50,   "
-        f"{invaded} fines in the sand"
-    )

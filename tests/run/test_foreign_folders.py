@@ -190,17 +190,6 @@ def test_the_table_of_laws_never_replaces_a_device_a_pipe_or_a_folder(tmp_path, 
     assert (tmp_path / "pipe").is_fifo()
 
 
-def test_a_half_table_of_a_killed_command_is_removed_by_the_next(tmp_path, capsys):
-    (tmp_path / "s.csv").write_text(CUBE)
-    (tmp_path / ".laws.4194399.part.csv").write_text("half")
-    (tmp_path / f".laws.{os.getppid()}.part.csv").write_text("of a program that runs")
-    assert (
-        answer(capsys, "permeability", tmp_path / "s.csv", "--csv", tmp_path / "laws.csv")[0] == 0
-    )
-    assert not (tmp_path / ".laws.4194399.part.csv").exists()
-    assert (tmp_path / f".laws.{os.getppid()}.part.csv").exists()
-
-
 @pytest.mark.liggghts
 def test_the_home_folder_is_meant_by_a_tilde(tmp_path, case, capsys, monkeypatch):
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
@@ -235,9 +224,3 @@ def test_no_folder_is_made_whose_name_is_a_tilde(tmp_path, case, capsys, monkeyp
     assert code == 2
     assert "home folder" in err
     assert not (tmp_path / "~").exists()
-
-
-def test_paths_given_to_the_scripts_may_begin_with_a_tilde(root):
-    """Options of the type Path would take the tilde as a folder of that name."""
-    for script in sorted((root / "scripts").glob("*.py")):
-        assert "type=Path" not in script.read_text(), script.name

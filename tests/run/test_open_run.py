@@ -1,8 +1,6 @@
 """A finished run: its tables as objects, and files that were changed are refused by name."""
 
-import errno
 import json
-import re
 import shutil
 import subprocess
 import sys
@@ -17,11 +15,8 @@ from scipy.sparse.linalg import spsolve
 
 import fdnet
 from fdnet.case.file import case_from
-from fdnet.cli import main
 from fdnet.errors import CaseError, FdnetError
 from fdnet.report.tables import openpnm_arrays
-from fdnet.report.text import facts
-from fdnet.run import pipeline
 from fdnet.run.finished import FinishedRun
 from fdnet.run.folder import TABLES
 from fdnet.run.pipeline import run_stages
@@ -112,36 +107,6 @@ def test_its_network_is_the_one_of_its_tables(run):
     assert k == pytest.approx(run.summary["k_damaged_other_m2"], rel=1e-7, abs=0)
 
 
-def test_its_meshes_are_ready_to_plot(run):
-    network, balls = run.network_mesh(), run.sphere_mesh("initial")
-    assert network.n_lines == run.summary["throats"]
-    assert "conductance_damaged_m3" in network.cell_data
-    grains = run.spheres("initial")
-    top = (grains.position + grains.radius[:, None]).max(axis=0)
-    assert np.array(balls.bounds)[1::2] == pytest.approx(top, rel=0.02, abs=0)
-    assert set(np.unique(balls.point_data["kind"])) == {1}
-
-
-def test_openpnm_finds_the_permeability_of_the_summary(either):
-    openpnm = pytest.importorskip("openpnm", reason="OpenPNM is not installed")
-    length, width, height = either.case.size_m
-    for state, law, number in (
-        ("initial", None, "k_initial_m2"),
-        ("damaged", None, "k_damaged_m2"),
-        ("damaged", "section-archie", "k_damaged_other_m2"),
-    ):
-        pores = either.to_openpnm(state, damage_law=law)
-        fluid = openpnm.phase.Phase(network=pores)
-        fluid["throat.hydraulic_conductance"] = pores["throat.hydraulic_conductance"]
-        stokes = openpnm.algorithms.StokesFlow(network=pores, phase=fluid)
-        stokes.set_value_BC(pores=pores.pores("inlet"), values=1.0)
-        stokes.set_value_BC(pores=pores.pores("outlet"), values=0.0)
-        stokes.run()
-        rate = float(stokes.rate(pores=pores.pores("inlet"))[0])
-        k = rate * either.case.fluid.viscosity_Pa_s * length / (width * height)
-        assert k == pytest.approx(either.summary[number], rel=1e-6, abs=0), (state, law)
-
-
 def test_the_arrays_for_openpnm_balance_without_it(either):
     """Solved with plain linear algebra.
 
@@ -174,22 +139,6 @@ def test_the_arrays_for_openpnm_balance_without_it(either):
     assert inflow == pytest.approx(expected, rel=1e-9, abs=0)
 
 
-def test_it_prints_in_the_units_of_the_field(run):
-    text = str(run)
-    summary = run.summary
-    assert f"fdnet run tiny in {run.path}" in text
-    assert f"{summary['k_initial_m2']:.3g} -> {summary['k_damaged_m2']:.3g} m2" in text
-    assert f"{100 * summary['k_reduction']:.1f} % lost" in text
-    line = re.search(r"\npermeability +([\d,]+) ->", text)
-    assert line
-    millidarcy = float(line[1].replace(",", ""))
-    assert text.splitlines()[1].startswith("95 % of the fines that entered lie within")
-    assert millidarcy == pytest.approx(summary["k_initial_m2"] / 9.869233e-16, rel=1e-3, abs=0)
-    assert max(len(line) for line in text.split("warning", maxsplit=1)[0].splitlines()) <= 120
-    assert repr(run) == f"FinishedRun('tiny', {str(run.path)!r})"
-    assert run._repr_html_().count("<tr>") == len(list(facts(summary))) + 1 + 3
-
-
 def test_a_run_without_fines_has_no_history(tmp_path):
     case = case_from({key: value for key, value in TINY.items() if key != "fines"})
     intact = fdnet.run_case(case, tmp_path / "run", stages=("pack", "analyse"))
@@ -197,25 +146,6 @@ def test_a_run_without_fines_has_no_history(tmp_path):
     assert "time_s" in intact.history
     assert "none supplied" in str(intact)
     assert len(intact.spheres()) == len(intact.spheres("initial"))
-
-
-def test_the_answer_is_printed_before_the_figures_whose_failure_is_said(
-    copied, monkeypatch, capsys
-):
-    printed = []
-
-    def fail(results):
-        printed.append(capsys.readouterr().out)
-        raise OSError(errno.ENOSPC, "No space left on device", "depth.png")
-
-    monkeypatch.setattr(pipeline, "draw_figures", fail)
-    again = ["--stages", "analyse,report", "--force", "--quiet"]
-    assert main(["run", str(copied / "case.toml"), "--out", str(copied), *again]) == 2
-    assert printed[0].startswith("95 % of the fines that entered lie within")
-    assert "permeability" in printed[0]
-    assert "depth.png: No space left on device" in capsys.readouterr().err
-    assert (copied / "summary.json").exists()
-    assert not (copied / "manifest.json").exists()
 
 
 def test_a_finished_run_is_read_and_one_of_another_case_refused(run):

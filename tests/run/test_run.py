@@ -1,7 +1,6 @@
 """Whole runs by command line and real binary: output contract, killing, resuming, refusals."""
 
 import contextlib
-import errno
 import fcntl
 import hashlib
 import io
@@ -18,8 +17,6 @@ import pytest
 from builders import naming, tiny
 
 from fdnet.cli import main
-from fdnet.errors import CaseError
-from fdnet.run.pipeline import RunOptions, run_stages
 
 pytestmark = pytest.mark.liggghts
 
@@ -136,23 +133,6 @@ def test_stages_still_to_run_take_the_new_policy(whole, tmp_path):
     assert "max_hours = 99" in text[2]
 
 
-def test_its_spheres_feed_the_permeability_command(whole):
-    run, _, summary = whole
-    box = ("--box", "0,0.003,0,0.0016,0,0.0016", "--periodic", "yz", "--sections", "3")
-    answer = fdnet("permeability", run / "spheres_damaged.csv", "--axis", "x", *box, "--json")
-    assert answer.returncode == 0, answer.stderr
-    result = json.loads(answer.stdout)
-    for name in ("k_initial_m2", "k_damaged_m2"):
-        assert result[name] == pytest.approx(summary[name], rel=1e-9, abs=0)
-    assert result["porosity_damaged"] == pytest.approx(summary["porosity_damaged"], abs=1e-9)
-
-
-def test_another_case_is_refused(whole, tmp_path):
-    refused = fdnet("run", write_case(tmp_path, "fines.count=200"), "--out", whole[0])
-    assert refused.returncode == 2
-    assert "holds a run of another case" in refused.stderr
-
-
 def test_force_with_another_law_keeps_pack_and_invasion(whole, copy):
     run, case, summary = whole
     law = ("--set", "analysis.law=thesis", "--stages", "analyse", "--force", "--json")
@@ -201,34 +181,6 @@ def test_a_complete_folder_that_lost_a_table_is_refused(whole, copy):
     refused = fdnet("run", whole[1], "--out", copy)
     assert refused.returncode == 2
     assert "sections.csv is missing" in refused.stderr
-
-
-def test_files_of_a_cut_run_that_are_broken_are_counted_or_refused(whole, copy):
-    """A dump in mid-history is counted, a history that counts what is not there is refused."""
-    _, case, summary = whole
-    command = ["run", case, "--out", cut(copy, "invade"), "--resume", "--json", *NUMBERS]
-    history = copy / "invade" / "history.csv"
-    rows = history.read_text().splitlines()
-    parts = rows[2].split(",")
-    wrong = [*rows[:2], ",".join([*parts[:2], "25", "9999", *parts[4:]]), *rows[3:]]
-    history.write_text("\n".join(wrong) + "\n")
-    refused = fdnet(*command)
-    assert refused.returncode == 3
-    assert "9999" in refused.stderr
-    history.write_text("\n".join(rows) + "\n")
-    dump = copy / "invade" / "post" / f"invade_{rows[1].split(',')[1]}.dump"
-    dump.write_bytes(b"")
-    done = fdnet(*command)
-    assert done.returncode == 0, done.stderr
-    result = json.loads(done.stdout)
-    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
-    assert any("1 of" in warning and "cannot be read" in warning for warning in result["warnings"])
-    packed = cut(copy) / "pack" / "post" / "pack.dump"
-    packed.write_bytes(packed.read_bytes()[:-50])
-    failed = fdnet(*command)
-    assert failed.returncode == 3
-    assert "pack.dump" in failed.stderr
-    assert "rows, then the file ends" in failed.stderr
 
 
 def test_a_failing_or_hanging_binary_ends_with_3_and_keeps_what_was_written(whole, tmp_path):
@@ -406,18 +358,6 @@ def test_bad_input_removes_the_parents_it_made_and_no_others(tmp_path):
     assert (tmp_path / "link").is_symlink()
 
 
-def test_a_folder_that_cannot_be_cleared_does_not_hide_the_refusal(tmp_path, monkeypatch):
-    def stuck(path):
-        raise OSError(errno.EBUSY, "Device or resource busy", str(path))
-
-    monkeypatch.setattr(shutil, "rmtree", stuck)
-    with pytest.raises(
-        CaseError,
-        match=r"needs grains that overlap .*; .*run could not be cleared \(Device or res",
-    ):
-        run_stages(tiny(TOO_DENSE), RunOptions(out=tmp_path / "run", show_progress=False))
-
-
 @pytest.fixture(params=[300, 600])
 def small_disk(tmp_path, request):
     """A file system of some hundred kB: it fills up early, or when restarts are there already."""
@@ -460,36 +400,6 @@ def test_two_ranks_complete_a_run(whole, tmp_path, binary):
     invaded = json.loads(done.stdout)["invaded_count"]
     assert abs(invaded - summary["invaded_count"]) < 0.2 * summary["invaded_count"]
     assert "processors 1 * *" in (out / "invade" / "in.invade").read_text()
-
-
-def test_an_intact_pack_needs_no_fines_and_mobile_grains_give_a_moved_permeability(tmp_path):
-    case = tmp_path / "case.toml"
-    text = tiny("grains.count=70").toml()
-    case.write_text(text[: text.index("[fines]")] + text[text.index("[fluid]") :])
-    done = fdnet("run", case, "--out", tmp_path / "run", "--json")
-    assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout)
-    assert summary["stop_reason"] is None
-    assert summary["supplied_count"] == 0
-    assert summary["k_damaged_m2"] == summary["k_initial_m2"]
-    assert any("no fines" in item for item in summary["left_out"])
-    case = write_case(tmp_path, "grains.motion=mobile")
-    done = fdnet("run", case, "--out", tmp_path / "mobile", "--json", *NUMBERS)
-    assert done.returncode == 0, done.stderr
-    summary = json.loads(done.stdout)
-    assert summary["k_damaged_m2"] <= summary["k_moved_m2"]
-
-
-def test_render_writes_decks_and_scales_without_a_binary(tmp_path, monkeypatch):
-    monkeypatch.setenv("FDNET_LIGGGHTS", "/nowhere")
-    case = write_case(tmp_path)
-    done = fdnet("render", case, "--out", tmp_path / "decks")
-    assert done.returncode == 0, done.stderr
-    assert "Carman-Kozeny permeability" in done.stdout
-    assert (tmp_path / "decks" / "pack" / "pack.data").exists()
-    again = fdnet("render", case, "--out", tmp_path / "decks")
-    assert again.returncode == 2
-    assert "is there already" in again.stderr
 
 
 def test_help_is_quick_to_import():

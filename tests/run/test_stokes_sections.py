@@ -47,11 +47,6 @@ def test_the_error_covers_the_orders_of_deposits():
             assert abs(flows[1].k / 1e-12 - 1.0) > end.error
 
 
-def test_packs_without_fines_are_of_second_order():
-    flows = [grid(n, 1e-12 * (1.0 + 5.0 * n**-2)) for n in (40, 60)]
-    assert estimate(*flows, with_fines=False).k == pytest.approx(1e-12, rel=1e-9)
-
-
 @pytest.fixture(scope="module", autouse=True)
 def rough():
     with pytest.MonkeyPatch.context() as patch:
@@ -150,23 +145,6 @@ def test_nothing_else_writes_meanwhile(resolved):
     with locked(resolved), pytest.raises(CaseError, match="fdnet stokes, is writing here"):
         stokes_sections(resolved, (1,), across=ROUGH)
     stokes_sections(resolved, (1,), across=ROUGH)
-
-
-@pytest.mark.liggghts
-def test_the_table_says_how_fine_the_grids_were(resolved, tmp_path):
-    """Another solve takes the place of the former, and shows how fine or rough it is."""
-    folder = Path(shutil.copytree(resolved, tmp_path / "run"))
-    (before,) = read_sections(folder / "stokes" / "sections.csv")
-    (row,) = stokes_sections(folder, (1,), across=1.6 * ROUGH)
-    spheres = fdnet.open_run(folder).spheres("damaged")
-    assert row["cell_damaged_m"] == pytest.approx(
-        spheres.fines().radius.mean() / (1.6 * ROUGH), rel=0.1
-    )
-    assert row["cell_damaged_m"] < before.cell_damaged_m
-    assert row["cell_initial_m"] == pytest.approx(
-        spheres.grains().radius.mean() / ROUGH_GRAIN, rel=0.1
-    )
-    assert row["network_damage_law"] == "all-spheres"
 
 
 def test_a_table_that_cannot_be_read_is_named_and_stops_no_report(tmp_path):

@@ -1,13 +1,11 @@
 """The time step and held drag below, at and above each bound, and the cost of a run."""
 
 import math
-import re
 
 import pytest
 from builders import naming, tiny
 
 from fdnet.case.case import Case
-from fdnet.case.file import case_from
 from fdnet.cli import main
 from fdnet.errors import CaseError
 from fdnet.scales.clock import relaxation_time
@@ -86,14 +84,6 @@ def test_explicit_drag_warns_above_a_tenth_of_tau_and_is_refused_above_tau():
                 scales_of(explicit(1.0001 * short, scheme))
 
 
-def test_implicit_drag_has_no_such_bound_but_tells_what_it_does_not_resolve():
-    short = tau(1e3)
-    for part in (0.1001, 1.0):
-        assert "implicit drag" not in warnings_of(explicit(part * short, "implicit"))
-    assert "turns into 0.33 of it" in warnings_of(explicit(1.0001 * short, "implicit"))
-    assert "turns into -0.2 of it" in warnings_of(explicit(3 * short, "implicit"))
-
-
 def refreshed(count: int, step: float) -> Case:
     return tiny(f"run.time_step_s={step!r}", f"drag.refresh_steps={count}")
 
@@ -133,15 +123,6 @@ def test_a_derived_step_keeps_both_bounds_without_a_warning():
             assert stiff.time_step == pytest.approx(factor * bound())
 
 
-def test_drag_is_never_held_longer_than_a_chunk():
-    """A nearly inviscid fluid has tau of hours; counts are still wanted every grain diameter."""
-    case = tiny("fluid.viscosity_cP=1e-9", "fluid.velocity_m_s=1.0")
-    scales = scales_of(case)
-    assert scales.relaxation_time[0] > 1.0
-    assert scales.hold_steps == scales.checkpoint_steps
-    assert scales.checkpoint_steps * scales.time_step == pytest.approx(0.5e-3, rel=1e-3)
-
-
 def test_a_refresh_beyond_the_chunk_is_refused():
     with pytest.raises(CaseError, match=r"between checkpoints; expected at most \d+"):
         scales_of(
@@ -158,26 +139,6 @@ def hours(case: Case) -> float:
     return (cost.pack_seconds + cost.invade_seconds) / 3600
 
 
-def test_nominal_stiffness_is_the_materials_own():
-    case = tiny("run.stiffness_N_m=nominal")
-    scales = scales_of(case)
-    assert scales.stiffness_factor == 1.0
-    assert scales.contacts["grain-grain"].normal_stiffness == pytest.approx(47.15e9)
-    assert case_from(case.data()) == case
-    assert scales.time_step == pytest.approx(scales_of(tiny()).time_step * (1e4 / 47.15e9) ** 0.5)
-
-
-def test_steps_and_so_hours_go_with_the_root_of_the_stiffness():
-    soft, stiff = (
-        cost_of(case, scales_of(case)) for case in (tiny(), tiny("run.stiffness_N_m=1e10"))
-    )
-    assert stiff.steps / soft.steps == pytest.approx(1e3, rel=1e-3)
-    assert stiff.invade_seconds / soft.invade_seconds == pytest.approx(1e3, rel=1e-3)
-    given = tiny("run.duration_ms=2.0")
-    steps = cost_of(given, scales_of(given)).steps
-    assert steps == pytest.approx(2e-3 / scales_of(given).time_step, abs=1)
-
-
 def test_the_limit_is_the_expected_hours():
     for factor, refused in ((0.999, True), (1.001, False)):
         limited = tiny(f"run.max_hours={factor * hours(tiny())}")
@@ -187,33 +148,6 @@ def test_the_limit_is_the_expected_hours():
     assert over_limit(case, scales, pack=True, invade=False) == ""
     assert over_limit(case, scales, pack=False, invade=False) == ""
     assert "run.max_hours: 0.01 h" in over_limit(case, scales, pack=False, invade=True)
-
-
-def test_the_refusal_names_what_makes_the_run_long():
-    for assignments, message in [
-        (
-            ["run.stiffness_N_m=nominal"],
-            r"set by contacts of 4.72e\+10 N/m\).* lower run.stiffness_N_m",
-        ),
-        (["run.time_step_s=1e-12"], r"\(as given\).* raise run.time_step_s"),
-        (
-            ["drag.multiplier=1e5", "fluid.velocity_m_s=1e-5"],
-            r"drag relaxation time\).* drag.scheme = 'implicit'",
-        ),
-        (["fines.count=1", "run.duration_ms=1e-4"], "most of it packing 66 grains"),
-    ]:
-        with naming(assignments, message):
-            case = tiny("run.max_hours=1e-6", "run.checkpoint_ms=0.001", *assignments)
-            assert re.search(message, over_limit(case, scales_of(case)))
-
-
-def test_a_thousandfold_viscosity_is_refused_for_its_hours_and_implicit_drag_is_named():
-    """tau is 1/1000: explicit drag needs steps of 2 ns, implicit drag those of the contacts."""
-    thick = ("fluid.viscosity_cP=5e4", "fluid.velocity_m_s=0.01", "fines.count=3000")
-    case = tiny(*thick)
-    said = over_limit(case, scales_of(case))
-    assert re.search(r"a tenth of the drag relaxation time.*drag\.scheme = 'implicit'", said)
-    assert hours(case) > 10 * hours(tiny(*thick, "drag.scheme=implicit"))
 
 
 def test_a_long_run_is_refused_before_anything_is_written_and_render_still_shows_it(

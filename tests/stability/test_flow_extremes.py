@@ -14,7 +14,7 @@ from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.spheres.snapshot import Array
 from tests.network.exact import exact_balance
-from tests.network.networks import chain, network_of
+from tests.network.networks import network_of
 from tests.network.packs import random_pack
 
 FACES = 4
@@ -62,15 +62,6 @@ def test_conductances_from_0_over_sixteen_decades_against_rational_arithmetic():
             assert flowing > 8
 
 
-def test_the_unit_of_conductance_does_not_matter():
-    for unit in [1e-300, 1e-30, 1e16, 1e200]:
-        with naming(unit):
-            network, g = random_pores(3, decades=6)
-            assert solve_flow(network, unit * g).inflow == pytest.approx(
-                unit * solve_flow(network, g).inflow, rel=1e-9
-            )
-
-
 def test_one_bad_conductance_among_many_is_refused_and_named():
     for bad in [np.nan, np.inf, -1.0, -1e-300]:
         with naming(bad):
@@ -103,70 +94,6 @@ def test_a_section_with_all_throats_blocked_leaves_k_0_there_and_k_elsewhere():
     )
     assert solve_flow(network, g, span=(0.0, 0.2 * length)).inflow > 0
     assert solve_flow(network, g, span=(0.4 * length, 0.6 * length)).inflow == 0
-
-
-def shortest_path(network: Network, conductance: Array) -> list[int]:
-    """Throats of a shortest path from face to face, by a breadth-first search."""
-    x, length = network.pore_position[:, 0], network.box[0, 1]
-    came: dict[int, tuple[int, int]] = {int(pore): (-1, -1) for pore in np.flatnonzero(x <= 0)}
-    edge = list(came)
-    links = [
-        np.flatnonzero(np.any(network.throat_pores == pore, axis=1)) for pore in range(len(x))
-    ]
-    while edge:
-        pore = edge.pop(0)
-        if x[pore] >= length:
-            path = []
-            while came[pore][1] >= 0:
-                path.append(came[pore][1])
-                pore = came[pore][0]
-            return path
-        for throat in links[pore]:
-            other = int(network.throat_pores[throat].sum() - pore)
-            inner = network.pore_group[other] != network.pore_group[pore]
-            if other not in came and conductance[throat] > 0 and inner:
-                came[other] = (pore, int(throat))
-                edge.append(other)
-    raise AssertionError("no path")
-
-
-def test_a_single_open_way_is_its_throats_in_series():
-    """1/g = sum of 1/g_i, the same flux through each, nothing elsewhere."""
-    for decades in [0.0, 16.0]:
-        with naming(decades):
-            network, clean = pack_network()
-            path = shortest_path(network, clean)
-            assert len(path) > 3
-            g = np.zeros(len(clean))
-            g[path] = clean[path] * 10.0 ** np.random.default_rng(0).uniform(0, decades, len(path))
-            flow = solve_flow(network, g)
-            assert flow.inflow == pytest.approx(
-                1.0 / np.sum(1.0 / (g * network.throat_share)[path]), rel=1e-9
-            )
-            assert np.abs(flow.throat_flux[path]) == pytest.approx(flow.inflow, rel=1e-9)
-            assert np.count_nonzero(flow.throat_flux) == len(path)
-
-
-def test_islands_are_counted_and_change_nothing():
-    """A ring of ten pores tied to nothing, and one tied to the inlet alone."""
-    angle = np.linspace(0, 2 * np.pi, 10, endpoint=False)
-    ring = np.column_stack([1.5 + np.cos(angle), 3 + np.sin(angle), np.zeros(10)])
-    position = np.vstack([[[n, 0.5, 0.5] for n in range(4)], ring, ring + np.array([0, 4, 0])])
-    loop = [(n, (n + 1) % 10) for n in range(10)]
-    pairs = [
-        (0, 1),
-        (1, 2),
-        (2, 3),
-        *((a + 4, b + 4) for a, b in loop),
-        *((a + 14, b + 14) for a, b in loop),
-        (0, 14),
-    ]
-    network = network_of(position, pairs, [[0, 3], [0, 9], [0, 1]])
-    flow = solve_flow(network, np.ones(len(pairs)))
-    alone = solve_flow(chain(3), np.ones(3))
-    assert flow.inflow == pytest.approx(alone.inflow, rel=1e-12)
-    assert flow.isolated_pores == 20
-    assert np.all(flow.throat_flux[3:] == 0)
 
 
 def test_sections_in_place_recombine_over_sixteen_decades():

@@ -10,7 +10,6 @@ from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import NetworkError
 from fdnet.network.network import build_network
 from fdnet.network.permeability import Analysis, analyse
-from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from tests.network.packs import face_centred, random_pack, simple_cubic, snapshot, with_fines
 
@@ -87,18 +86,6 @@ def test_lattice_does_not_feel_a_shake_of_1e_12():
                 )
 
 
-def test_damage_of_a_lattice_depends_on_the_split_by_less_than_documented():
-    """0.7 % in SC with 150 fines by `section-archie` (docs/physics_network.md, section 2)."""
-    for name, (pack, _) in LATTICES.items():
-        with naming(name):
-            filled = with_fines(pack, 150, 0.1)
-            fines = filled.fines()
-            moved = shaken(pack, 1e-12)
-            analyses = [measure(grains, grains.joined(fines), ALL) for grains in (pack, moved)]
-            assert analyses[1].k_damaged == pytest.approx(analyses[0].k_damaged, rel=8e-3)
-            assert analyses[0].k_damaged < analyses[0].k_initial
-
-
 JUMP = {"SC": 0.015}
 """By how much k changes where polyhedra fall apart."""
 
@@ -129,15 +116,6 @@ def test_one_layer_is_the_lattice_its_mirror_images_make_up():
     assert measure(one).k_initial == pytest.approx(
         measure(layer, periodic=ALL).k_initial, rel=1e-6
     )
-
-
-def test_one_random_layer_is_half_of_its_periodic_double():
-    rng = np.random.default_rng(2)
-    place = np.indices((1, 4, 4)).reshape(3, -1).T * 2.2 + 1.1 + rng.uniform(-0.15, 0.15, (16, 3))
-    box = np.array([[0, 2.2], [0, 8.8], [0, 8.8]])
-    mirrored = np.vstack([place, place * [-1, 1, 1] + [4.4, 0, 0]])
-    whole = measure(snapshot(mirrored, 1.0, box * [[2], [1], [1]]), periodic=ALL)
-    assert measure(snapshot(place, 1.0, box)).k_initial == pytest.approx(whole.k_initial, rel=1e-6)
 
 
 def test_a_box_thinner_than_a_grain_between_planes_of_symmetry_is_the_lattice():
@@ -241,42 +219,6 @@ def test_swelling_grains_close_throat_by_throat_until_no_path_is_left():
     assert analysis.porosity_initial < 1e-3
 
 
-def test_radii_one_to_four_keep_the_void_and_the_invariances():
-    pack = random_pack(120, 0.55, spread=0.6)
-    assert pack.radius.max() / pack.radius.min() > 3.9
-    network = build_network(pack, periodic=ALL)
-    chords = measure_porosity(pack, periodic=ALL, lines=20_000)
-    void = network.pore_volume.sum() / np.prod(np.ptp(pack.box, axis=1))
-    assert void == pytest.approx(chords.mean, abs=5 * chords.standard_error + 1e-3)
-    analysis = measure(pack, periodic=ALL)
-    mirrored = snapshot(pack.box[:, 1] - pack.position, pack.radius, pack.box)
-    small = snapshot(1e-4 * pack.position, 1e-4 * pack.radius, 1e-4 * pack.box)
-    assert measure(mirrored, periodic=ALL).k_initial == pytest.approx(analysis.k_initial, rel=1e-6)
-    assert measure(small, periodic=ALL).k_initial == pytest.approx(
-        1e-8 * analysis.k_initial, rel=1e-6
-    )
-
-
-def test_no_fines_change_nothing():
-    pack = random_pack(60)
-    analysis = measure(pack, pack, ALL)
-    assert analysis.k_damaged == analysis.k_initial
-    assert analysis.porosity_damaged == analysis.porosity_initial
-
-
-def test_one_fine_in_one_pore_lowers_k_by_less_than_closing_that_pore():
-    """Rayleigh: lower conductances lower k.
-
-    Closing the throats of all pores that the fine reaches lowers it further.
-    """
-    lattice = simple_cubic()
-    analysis = measure(lattice, joined(lattice, cubic_pores()[:1], 0.2), ALL)
-    closed = measure(
-        lattice, joined(lattice, cubic_pores()[:1], 0.73), ALL, ("lubrication", "thesis")
-    )
-    assert closed.k_damaged < analysis.k_damaged < analysis.k_initial
-
-
 def test_fines_larger_than_every_throat_close_a_lattice():
     """In SC the throats between cells have the radius sqrt(2) - 1 = 0.4142.
 
@@ -297,26 +239,6 @@ def test_fines_larger_than_every_throat_close_a_lattice():
                 assert analysis.k_reduction == 1.0
                 assert analysis.occupancy is not None
                 assert analysis.occupancy.blocked.sum() > 0
-
-
-def test_fines_that_fill_the_pack_leave_no_k():
-    """With more volume of (overlapping) fines than void, k is 0 or nearly 0, and reported.
-
-    Fines at random places leave exp(-n v / V) of the void (Boolean model, Matheron 1975).
-    """
-    for law in ["thesis", "section-archie"]:
-        with naming(law):
-            pack = random_pack(40)
-            rng = np.random.default_rng(1)
-            fines = rng.random((4000, 3)) * pack.box[:, 1]
-            analysis = measure(pack, joined(pack, fines, 0.3), ALL, ("lubrication", law))
-            left = np.exp(-4000 * 4 / 3 * np.pi * 0.3**3 / np.prod(pack.box[:, 1]))
-            assert analysis.porosity_damaged == pytest.approx(
-                left * analysis.porosity_initial, rel=0.1
-            )
-            assert analysis.k_damaged < 1e-3 * analysis.k_initial
-            if law == "section-archie":
-                assert analysis.counts["pore_porosity_negative"] > 0
 
 
 def test_a_fine_wider_than_a_periodic_side_is_refused_at_once():
@@ -342,30 +264,6 @@ def test_a_grain_that_is_there_twice_counts_once():
                 measure(pack, periodic=ALL).k_initial, rel=1e-3
             )
             assert analysis.counts["spheres_dropped"] == 1
-
-
-def test_grains_nearly_in_one_place_are_one_grain_to_the_flow():
-    """Two centres 2e-3 radii apart: the porosity is that of their union.
-
-    k is that of one grain, within the effect of the shift.
-    """
-    pack = random_pack(40)
-    doubled = snapshot(
-        np.vstack([pack.position, pack.position[:1] + np.array([2e-3, 0, 0])]), 1.0, pack.box
-    )
-    one, two = measure(pack, periodic=ALL), measure(doubled, periodic=ALL)
-    assert two.porosity_initial == pytest.approx(one.porosity_initial, abs=1e-4)
-    assert two.k_initial == pytest.approx(one.k_initial, rel=0.05)
-
-
-def test_doubled_fines_take_up_their_place_once():
-    """Porosity counts the union; laws that sum volumes see both, and never raise k."""
-    pack = random_pack(40)
-    single = with_fines(pack, 50, 0.15)
-    doubled = single.joined(snapshot(single.fines().position, 0.15, pack.box, Kind.FINE))
-    one, two = measure(pack, single, ALL), measure(pack, doubled, ALL)
-    assert two.porosity_damaged == pytest.approx(one.porosity_damaged, abs=1e-12)
-    assert two.k_damaged <= one.k_damaged < one.k_initial
 
 
 def test_coordinates_far_from_the_origin_cost_digits_alone():

@@ -9,10 +9,8 @@ import pytest
 
 from fdnet.cli import main
 from fdnet.errors import CaseError, DumpError
-from fdnet.network.fines.occupancy import measure_occupancy
-from fdnet.network.network import build_network
 from fdnet.spheres.dump import parse_dump
-from tests.network.packs import random_pack, simple_cubic, snapshot
+from tests.network.packs import random_pack, snapshot
 
 UNIT = ("--units", "mm", "--box", "0,4,0,4,0,4")
 HOSTILE = ["nan", "NaN", "inf", "-inf", "1e400", "-1e999", "", "1,5", "0x10", "1_0", "none"]
@@ -119,10 +117,3 @@ def test_a_pack_whose_paths_are_all_closed_is_an_answer_at_the_command_line(tmp_
     assert result["k_initial_m2"] == result["k_damaged_m2"] == 0
     assert result["k_reduction"] is None
     assert any("k_initial = 0: no open path" in one for one in result["warnings"])
-
-
-def test_no_fines_are_no_fault_of_occupancy():
-    pack = simple_cubic()
-    occupancy = measure_occupancy(build_network(pack, periodic=(True,) * 3), pack.fines())
-    assert not occupancy.blocked.any()
-    assert occupancy.pore_solid_volume.sum() == 0

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import tomli_w
-from builders import TINY, naming
+from builders import TINY
 
 from fdnet.case.file import read_case, set_keys
 from fdnet.cli import main
@@ -98,26 +98,6 @@ def test_a_hard_case_runs_and_keeps_its_bounds(tmp_path, name, assignments):
         assert any("denser than rigid spheres get" in one for one in summary["warnings"])
 
 
-def test_one_layer_of_grains_runs(tmp_path):
-    """3 mm x 0.55 mm x 2.5 mm: grains of 0.5 mm side by side between two walls."""
-    code, summary, err = run(
-        tmp_path, "box.size_mm=[3.0, 0.55, 2.5]", "grains.count=22", "fines.count=100"
-    )
-    assert code == 0, err
-    assert summary["supplied_count"] == 100
-    assert 0 < summary["k_damaged_m2"] <= summary["k_initial_m2"]
-    plain = 1 - 22 * 4 / 3 * math.pi * 0.25**3 / (3.0 * 0.55 * 2.5)
-    assert summary["porosity_initial"] == pytest.approx(plain, abs=5e-3)
-
-
-def test_one_fine_lowers_k_by_less_than_its_pore(tmp_path):
-    code, summary, err = run(tmp_path, "fines.count=1", "run.cap_ms=0.35")
-    assert code == 0, err
-    check_bounds(tmp_path, summary)
-    assert summary["invaded_count"] + summary["passed_count"] + summary["upstream_count"] == 1
-    assert summary["k_damaged_m2"] > 0.95 * summary["k_initial_m2"]
-
-
 def test_no_fines_leave_the_pack_as_it_is(tmp_path):
     code, summary, err = run(tmp_path, without="fines")
     assert code == 0, err
@@ -134,40 +114,6 @@ def test_fines_larger_than_every_throat_stay_at_the_face(tmp_path):
     assert summary["passed_count"] == 0
     assert summary["invasion_depth_m"] < 1e-3
     assert summary["upstream_count"] > 20
-
-
-def test_what_cannot_be_is_refused_before_anything_is_written(tmp_path):
-    for number, (assignments, message) in enumerate(
-        [
-            (
-                ["box.size_mm=[0.4, 2.5, 2.5]", "grains.count=20"],
-                "side x is 0.4 mm, expected at least 0.5 mm",
-            ),
-            (
-                ["box.size_mm=[3.0, 0.4, 2.5]", "grains.count=20"],
-                "side y is 0.4 mm, expected at least 0.5 mm",
-            ),
-            (
-                ["box.sides='periodic'", "box.size_mm=[3.0, 0.9, 2.5]"],
-                "a grain would meet its own image",
-            ),
-            (["grains.count=118"], "spheres sum to more than the box; expected at most 117"),
-            (
-                ["drag.multiplier=1000.0", "fluid.velocity_m_s=40.0"],
-                "run.stiffness_N_m: drag alone would press a fine",
-            ),
-            (["fines.count=0"], "fines.count: 0"),
-            (["fines.radius_mm=0.25"], "not below grains.radius_mm"),
-        ]
-    ):
-        folder_ = tmp_path / str(number)
-        folder_.mkdir()
-        with naming(assignments, message):
-            code, _, err = run(folder_, *assignments)
-            assert code == 2
-            assert message in err
-            assert len(err.strip().splitlines()) == 1
-            assert not (folder_ / "run").exists()
 
 
 def test_a_pack_denser_than_reachable_is_refused_with_the_overlap_it_needs(tmp_path):

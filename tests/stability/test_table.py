@@ -1,4 +1,4 @@
-"""The table of evidence, and the page of promises, name tests that exist."""
+"""The table of evidence names tests that exist."""
 
 import ast
 import csv
@@ -25,13 +25,3 @@ def test_every_row_of_the_stability_table_names_tests_that_exist(root):
             assert name in {
                 node.name for node in tree.body if isinstance(node, ast.FunctionDef)
             }, (path, name)
-
-
-def test_every_promise_names_its_test(root):
-    """That the tests exist is checked for all pages (test_tests_named_on_pages_exist)."""
-    page = (root / "docs" / "reference" / "promises.md").read_text(encoding="utf-8")
-    rows = [line for line in page.splitlines() if line.startswith("| ")]
-    tables = page.split("## The same pack")[0]
-    promises = [row for row in rows if row in tables and "| Test |" not in row]
-    assert len(promises) > 25
-    assert [row for row in promises if not re.search(r"`test_\w+`", row)] == []
