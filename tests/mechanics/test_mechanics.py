@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fdnet.errors import CaseError, MechanicsError
+from fdnet.errors import MechanicsError
 from fdnet.mechanics.elastic import elastic_of
 from fdnet.mechanics.springs import (
     Cement,
-    Moduli,
     PackMaterial,
-    anisotropy_of,
     bond_springs,
     bond_stress,
     direct_solver,
@@ -20,7 +18,6 @@ from fdnet.mechanics.springs import (
     iterative_solver,
     kinematics,
     stiffness_matrix,
-    voigt_average,
     young_along,
 )
 from fdnet.mechanics.triaxial import (
@@ -178,18 +175,6 @@ def test_rattlers_are_counted_and_a_layer_that_touches_nothing_is_refused_by_its
         elastic_of(resting(place[place[:, 2] < R], R, box), SPRINGS, periodic=ALL)
 
 
-def test_constants_of_a_cubic_tensor():
-    """Hill (1952): K = (C11 + 2 C12) / 3, G_V = (C11 - C12 + 3 C44) / 5; E along an axis."""
-    tensor = np.diag([6.0] * 3 + [4.0] * 3)
-    tensor[:3, :3] += 5.0
-    averaged = voigt_average(tensor)
-    assert (averaged.bulk, averaged.shear) == (pytest.approx(7.0), pytest.approx(3.6))
-    assert young_along(tensor)[0] == pytest.approx(6 * 21 / 16)
-    reuss = 5 / (2 * 2 / 6 + 3 / 4)
-    assert anisotropy_of(tensor) == pytest.approx(5 * 3.6 / reuss - 5)
-    assert Moduli(7.0, 3.6).young == pytest.approx(9 * 7 * 3.6 / (21 + 3.6))
-
-
 # ------------------------------------------------------------------------------------------------
 # Triaxial tests.
 
@@ -205,13 +190,6 @@ def strained(pack, material, strain):
     load = Load(strain=np.array([strain, 0, 0]), stress=np.zeros(3), drag=1e-3, within=1e-12)
     motion, given, _ = balance(loaded, load)
     return loaded, *carried_out(loaded, motion, given)
-
-
-def test_a_contact_opens_and_pulls_nothing():
-    pack = at_rest(column(), SAND, ALL, relieved=True)
-    _, pushed, forces = strained(pack, SAND, -1e-4)
-    assert forces.normal.max() == pytest.approx(5e7 * 1e-4 * 2 * R, rel=1e-6)
-    assert strained(pushed, SAND, 3e-4)[2].normal.max() == 0
 
 
 def test_bonds_break_in_tension_and_shear_at_their_strength():
@@ -260,14 +238,6 @@ def test_dense_sand_yields_at_the_ratio_of_its_friction():
     peaks = [triaxial(pack, one, test, periodic=ALL).peak for one in materials]
     low, high = (peak.axial / peak.side for peak in peaks)
     assert 1.2 < low < 0.9 * high < 4.0
-
-
-def test_stresses_and_packs_that_cannot_be_tested_are_refused():
-    with pytest.raises(CaseError, match="expected at most 5 %"):
-        triaxial(random_pack(60), SAND, Triaxial(confining=5e10), periodic=ALL)
-    far = resting(column().position, 0.8 * R, column().box)
-    with pytest.raises(MechanicsError, match="has no contacts"):
-        triaxial(far, SAND, Triaxial(confining=1e6), periodic=ALL)
 
 
 def test_a_pack_that_falls_apart_under_its_stress_is_refused_with_advice():

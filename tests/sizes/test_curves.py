@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from builders import tiny
-from scipy.integrate import quad
 from scipy.special import gamma, gammaincinv, ndtr
 
 from fdnet.errors import CaseError
@@ -27,7 +26,6 @@ from fdnet.sizes import (
     SizeCurve,
     Uniform,
     best_fit,
-    blended,
     cut_curve,
     dealt,
     volume_quantiles,
@@ -86,16 +84,6 @@ def test_moments_of_rosin_and_rammler_are_gamma_functions():
         if exponent > 3:
             sauter = 4e-4 / gamma(1 - 1 / exponent)
             assert whole.mean(3) / whole.mean(2) == pytest.approx(sauter, rel=1e-8)
-    # between cuts also where the gamma functions of the whole do not exist (p <= -n)
-    curve = cut_curve(RosinRammler(4e-4, 1.5), cut=(0.01, 0.99))
-    for power in (-3, -2, 0.5, 2):
-
-        def density(d: float, power: float = power) -> float:
-            u = (d / 4e-4) ** 1.5
-            return d**power * 1.5 / d * u * math.exp(-u)
-
-        exact = quad(density, curve.low, curve.high, epsrel=1e-12, limit=500)[0]
-        assert curve.total(power) == pytest.approx(exact, rel=1e-10), power
     # by number to volume: F = P(1 + 3/n, u), the regularised incomplete gamma function
     curve = cut_curve(RosinRammler(4e-4, 2.0), by=NUMBER, cut=(0.05, 0.9))
     ends = [4e-4 * gammaincinv(2.5, share) ** 0.5 for share in (0.05, 0.9)]
@@ -142,21 +130,6 @@ def test_strata_and_batches_have_the_curve_of_the_whole():
         assert len(batch) == count
         finer = [np.sum(batch < share * sum(counts)) for share in shares]
         assert np.abs(np.array(finer) - count * np.array(shares)).max() <= 1.5
-
-
-def test_a_blend_sums_its_parts_by_volume():
-    """Mean volume by number: 1 / sum(w / <v>), and shares finer add up by their volumes."""
-    first = cut_curve(LogNormal(40e-6, 0.3), cut=(0.01, 0.99))
-    second = cut_curve(LogNormal(80e-6, 0.5), cut=(0.02, 0.95))
-    both = blended((0.7, 0.3), (first, second))
-    kept = np.array([0.7 * first.kept, 0.3 * second.kept])
-    weight, size = kept / kept.sum(), np.array([60e-6])
-    mean = 1 / (weight[0] / first.mean(3) + weight[1] / second.mean(3))
-    assert both.mean(3) == pytest.approx(mean, rel=1e-9)
-    exact = weight @ np.array([first.share_finer(size)[0], second.share_finer(size)[0]])
-    assert float(both.share_finer(size)[0]) == pytest.approx(exact, rel=1e-5)
-    assert both.below == pytest.approx(0.7 * 0.01 + 0.3 * 0.02)
-    assert both.kept == pytest.approx(kept.sum())
 
 
 def test_three_points_of_a_law_are_met_and_others_by_the_line_of_least_squares():
