@@ -11,11 +11,10 @@ from fdnet.network.laws.deposit_resistances import (
 )
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
-from fdnet.network.laws.reaching_grains import cut_corners
 from fdnet.network.network import build_network
 from fdnet.network.states import cut_out
 from fdnet.network.stokes import extrapolate, solve_slab
-from fdnet.spheres.snapshot import Kind, Snapshot
+from fdnet.spheres.snapshot import Kind
 from tests.network.packs import body_centred, random_pack, with_fines
 
 ALL, NONE, SIDES = (True,) * 3, (False,) * 3, (False, True, True)
@@ -51,29 +50,6 @@ def test_thin_slabs_against_resolved_stokes_flow():
         network = build_network(cut_out(pack, span, SIDES), periodic=SIDES)
         k = whole_permeability(network, 1.0 / half_resistances(network).sum(axis=1))[0]
         assert k == pytest.approx(exact, rel=error), (count, more, share)
-
-
-def test_the_cap_of_a_grain_that_a_face_cuts():
-    """A grain of radius 5 centred 3 beyond the face x = 0, another 1 beyond x = 10.
-
-    The cap shows the sections of its half ellipsoid: base 4, height 2; volume 52 pi / 3.
-    """
-    grains = [[-3.0, 5.0, 5.0], [4, 2, 2], [4, 8, 2], [4, 5, 8], [11, 5, 5]]
-    spheres = Snapshot.from_arrays(grains, [5.0, 2, 2, 2, 3], box=[0, 10, 0, 10, 0, 10])
-    network = build_network(spheres)
-    cap = network.image_grain == 0
-    h = 2.0 * (3.0 * 16.0 + 4.0) / (4.0 * 16.0)
-    assert network.image_height[cap] == pytest.approx(h, rel=1e-6)
-    assert 2.0 / 3.0 * network.image_radius[cap] ** 3 == pytest.approx(52.0 / 3.0, rel=1e-3)
-    assert network.image_radius[cap] ** 3 / h == pytest.approx(16.0, rel=1e-3)
-    facet = network.image_position[network.throat_images]
-    cut, grain = cut_corners(network, slice(0, len(facet)), facet), network.throat_grains
-    for which, away, radius in ((0, 3.0, 5.0), (4, 1.0, 3.0)):
-        ways = cut[grain == which]
-        assert len(ways)
-        assert np.linalg.norm(ways[:, :3], axis=1) == pytest.approx(away, rel=1e-9)
-        assert ways[:, 3] == pytest.approx(radius, rel=1e-3)
-    assert not cut[(grain != 0) & (grain != 4)].any()
 
 
 # ------------------------------------------------------------------------------------------------

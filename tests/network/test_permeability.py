@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fdnet.case.tables import AnalysisChoices
-from fdnet.errors import CaseError, NetworkError
+from fdnet.errors import NetworkError
 from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Kind
 from tests.network.packs import random_pack, with_fines
@@ -85,16 +85,3 @@ def test_moved_grains_make_a_second_network_and_renumbered_ones_none(pack):
         assert analysed(same, ALL, before=grains).k_moved is None
     with pytest.raises(NetworkError, match="differ"):
         analysed(pack.where(np.arange(len(pack)) > 0), ALL, before=grains)
-
-
-def test_wrong_choices_are_refused(pack):
-    for wrong in (
-        {"law": "magic"},
-        {"damage_law": "magic"},
-        {"sections": [0.0, 1.0]},
-        {"sections": []},
-        {"sections": 0},
-        {"profile_bin_mm": 0.0},
-    ):
-        with pytest.raises(CaseError, match=next(iter(wrong))):
-            analyse(pack.grains(), None, periodic=ALL, options=AnalysisChoices.of_pack(**wrong))

@@ -103,7 +103,7 @@ def test_periods_turns_and_units_change_nothing():
     assert other.k == pytest.approx(1e-6 * field("yz").k, rel=2e-3)
 
 
-def test_a_finer_grid_is_closer_and_about_a_million_cells_where_none_is_asked_for():
+def test_a_finer_grid_is_closer():
     fine = field("xyz", 20.0).at(points())
     speed = np.linalg.norm(fine, axis=1)[np.any(fine, axis=1)].mean()
     errors = [
@@ -112,9 +112,6 @@ def test_a_finer_grid_is_closer_and_about_a_million_cells_where_none_is_asked_fo
     ]
     assert errors[1] < 0.16
     assert errors[1] < 0.6 * errors[0] < 0.2
-    small = fdnet.velocity_field(pack(), periodic="xyz").lattice.spacing
-    assert small == pytest.approx(2.0 / 18.0, rel=0.1)
-    assert small.max() <= 2.0 / 18.0
 
 
 def test_fines_turn_the_flow_and_those_off_the_grid_are_left_out_and_counted():
@@ -174,18 +171,3 @@ def test_the_line_of_a_wave_is_the_integral_of_its_slope():
     for step, until in [(0.0, 1.0), (0.1, -1.0)]:
         with pytest.raises(CaseError, match="expected both to be positive"):
             streamlines(wave, np.zeros((1, 3)), step=step, until=until)
-
-
-def test_a_line_ends_where_the_fluid_stands_still_and_where_it_goes_in_circles():
-    wall, starts = (
-        Velocity(lambda x, y, z: (np.where(x < 1.0, 1.0, 0.0), 0.0, 0.0)),
-        np.zeros((2, 3)),
-    )
-    starts[1, 0] = 1.5
-    stopped, beyond = streamlines(wall, starts, step=0.3, until=2.0)
-    assert 1.0 - 0.3 / 16 < stopped[-1, 0] < 1.0
-    assert beyond == pytest.approx(starts[1:])
-    circle, start = Velocity(lambda x, y, z: (-y, x, 0.0)), np.array([[1.0, 0.0, 0.0]])
-    (line,) = streamlines(circle, start, step=0.01, until=2.0, longest=7.0)
-    assert np.linalg.norm(line, axis=1) == pytest.approx(1.0, abs=1e-3)
-    assert len(line) == 701

@@ -15,7 +15,6 @@ from fdnet.scales.pack import (
     refuse_unreachable,
     within_limit,
 )
-from fdnet.scales.scales import scales_of
 from fdnet.sizes import (
     NUMBER,
     SURFACE,
@@ -178,10 +177,3 @@ def test_a_porosity_out_of_reach_is_refused_with_what_can_be():
     made = 1 - (1 - 0.36) * 1.04**3
     assert within_limit(0.36, made, 0.08, 0.04) == pytest.approx(1 - (1 - 0.36) * 1.02**3)
     assert within_limit(0.36, made, 0.08, 0.0) == pytest.approx(0.36)
-    # log-normal sand with a spread of 0.34 by volume gets to about 0.32
-    curve = 'sizes={D10="0.25 mm", D50="0.40 mm", D90="0.60 mm"}'
-    box, fines = "box.size_mm=[3.0, 2.4, 2.4]", "fines.radius_mm=0.02"
-    for porosity, dense in ((0.30, True), (0.38, False)):
-        said = scales_of(tiny(box, fines, f"grains={{{curve}, porosity={porosity}}}")).warnings
-        assert any("0.3 grains overlap" in one for one in said) == dense
-        assert any("at random" in one for one in said) <= dense

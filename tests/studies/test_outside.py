@@ -1,12 +1,9 @@
 """Comparisons with numbers from outside: statistics, set-ups, quick forms, committed rows."""
 
-import math
-
 import pytest
 
 from validation import mechanics, outside
 from validation.comparisons import findings, read_rows, table
-from validation.outside import Clogging, fitted_line
 
 OPEN = {
     "ln P of a clog, friction 0.1",
@@ -15,22 +12,6 @@ OPEN = {
     "k of sand of quartz, 35 MPa over 0",
 }
 """What disagrees, and is said to."""
-
-
-def test_the_fitted_line_is_found_again():
-    holes = {}
-    for ratio in (1.75, 2.0, 2.5, 3.0, 4.0):
-        chance = math.exp(-0.4 - 0.7 * (ratio**2 - 1))
-        clogs = 4 if ratio == 4.0 else 10_000
-        holes[ratio] = Clogging((round(clogs * (1 - chance) / chance), 0), clogs, 0)
-    line = fitted_line(holes)
-    assert (line.slope, line.start) == pytest.approx((-0.7, -0.4), rel=1e-3)
-    assert line.holes == (1.75, 2.0, 2.5, 3.0)
-    assert (line.explained, line.chance) == (pytest.approx(1.0), pytest.approx(1.0, abs=0.01))
-    bent = holes | {1.75: holes[1.75]._replace(counts=(2 * holes[1.75].counts[0], 0))}
-    assert fitted_line(bent).chance < 1e-6
-    few = holes | {1.75: holes[1.75]._replace(early=2), 2.0: holes[2.0]._replace(early=2)}
-    assert fitted_line(few) is None
 
 
 @pytest.mark.liggghts
