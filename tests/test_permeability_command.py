@@ -97,20 +97,6 @@ def test_bad_options_end_with_2_and_one_line(tmp_path, answer):
         assert len(err.strip().splitlines()) == 1, err
 
 
-@pytest.mark.filterwarnings("error")
-def test_degenerate_spheres_end_with_4(tmp_path, answer):
-    rows = [(0.5, 0.5, 0.5), (1.5, 0.5, 0.5), (0.5, 1.5, 0.5), (0.5, 0.5, 0.5)]
-    flat = table(tmp_path / "flat.csv", [(*row, 0.5) for row in rows])
-    for path, box, said in [
-        (flat, "0,2,0,2,0,2", "3 of 3 grains reach into the box"),
-        (cubic(tmp_path / "sc.csv"), "50,54,50,54,50,54", "0 of 64 grains reach into the box"),
-    ]:
-        code, _, err = answer(path, "--units", "mm", "--box", box)
-        assert code == 4
-        assert said in err
-        assert len(err.strip().splitlines()) == 1
-
-
 def test_three_axes_at_once_are_the_three_one_by_one(tmp_path, answer, numbers):
     path = damaged(tmp_path / "s.csv")
     given = ["--box", FOUR, "--periodic", "yz", "--fines-below", 0.3]

@@ -120,13 +120,6 @@ def test_bad_keys_and_tests_are_refused(packed, capsys, tmp_path):
     assert "carries no load along x" in capsys.readouterr().err
 
 
-def test_bonds_change_no_digest_and_one_strength_alone_is_refused():
-    bonded = case_from(PLAIN | {"bonds": {"radius_ratio": 0.5}})
-    assert bonded.digest() == case_from(PLAIN).digest()
-    with pytest.raises(CaseError, match=r"bonds.shear_strength_MPa: missing"):
-        case_from(PLAIN | {"bonds": {"radius_ratio": 0.5, "tensile_strength_MPa": 3.0}})
-
-
 @pytest.mark.liggghts
 def test_the_report_gets_its_section_unless_the_numbers_are_spoilt(packed, tmp_path):
     page = tmp_path / "report.html"

@@ -11,7 +11,6 @@ import fdnet
 from fdnet.case.file import case_from, parse_sizes, read_case, read_size_file
 from fdnet.dem.deck import specimen_box
 from fdnet.dem.invade_deck import write_invade_inputs
-from fdnet.dem.packing import draw_radii
 from fdnet.dem.supply import (
     batches_of,
     densities,
@@ -20,10 +19,8 @@ from fdnet.dem.supply import (
 )
 from fdnet.errors import CaseError
 from fdnet.scales.contacts import mass_range
-from fdnet.scales.pack import diameter_at
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
-from fdnet.sizes import volume_quantiles
 from fdnet.spheres.snapshot import Kind, resting
 
 SAND = {"D10": "0.25 mm", "D50": "0.40 mm", "D90": "0.60 mm"}
@@ -105,18 +102,6 @@ def test_a_bad_curve_gets_one_clear_problem():
         (measured(fines=None, materials=[MIXTURE[0]] * 2), "'CaCO3' is listed twice"),
     ]:
         assert expected in problem(data), expected
-
-
-def test_placed_grains_have_the_curve_and_the_seed_decides_their_order():
-    case = case_from(measured())
-    radii, other = draw_radii(case, 531), draw_radii(case_from(measured() | {"seed": 2}), 531)
-    assert np.array_equal(radii, draw_radii(case, 531))
-    assert not np.array_equal(radii, other)
-    assert np.array_equal(np.sort(radii), np.sort(other))
-    assert np.mean(4 / 3 * math.pi * radii**3) == pytest.approx(case.grains.mean_volume_m3)
-    for share in (0.1, 0.5, 0.9):
-        size = volume_quantiles(2 * radii, [(share - 0.01) / 0.98])[0]
-        assert size == pytest.approx(diameter_at(case.grains.curve, share), rel=0.03), share
 
 
 def test_materials_have_their_shares_of_mass_and_their_densities(tmp_path):

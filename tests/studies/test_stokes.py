@@ -156,13 +156,8 @@ def test_the_drag_of_a_wall_on_cells_of_unequal_edges():
 
 def test_refusals(monkeypatch):
     one = cell(SC, 0.3)
-    for pack, settings, words in (
-        (one, {"cells": 3}, "at least 4"),
-        (cell(np.zeros((0, 3)), np.zeros(0)), {"cells": 10}, "no wall"),
-        (one, {"cells": 10, "axis": 3}, "axis 3"),
-    ):
-        with pytest.raises(CaseError, match=words):
-            solve_stokes(pack, **settings)
+    with pytest.raises(CaseError, match="at least 4"):
+        solve_stokes(one, cells=3)
     with pytest.raises(CaseError, match="no wall"):
         solve_slab(CUT, (40.0, 47.0), cells=9)
     flow = solve_stokes(one, cells=10)
