@@ -6,8 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from fdnet.network.laws.named import LAWS
-from fdnet.network.permeability import analyse
 from fdnet.spheres.snapshot import Kind, resting
 from validation import truth
 from validation.accuracy import (
@@ -16,33 +14,9 @@ from validation.accuracy import (
     SLABS,
     THROATS,
     by_all_spheres,
-    pack_row,
     slab_row,
-    summary,
     tables,
 )
-
-
-def test_mean_and_worst_are_of_logarithms():
-    assert summary([math.exp(0.03), math.exp(-0.04)]) == "3.5 %, 0.961"
-    assert summary([1.3, 0.7, 1.01]).endswith(", 0.700")
-    assert summary([math.e**2, math.e**-2]) == "factor 7.4, 7.4"
-
-
-def test_laws_on_two_packs():
-    """Near truth on SC and on pack C with fines, whose k/k0 the thesis's laws miss by far."""
-    cases = {case.name: case for case in truth.cases(["SC_touching", "C_r5_d2"])}
-    intact, damaged = pack_row(cases["SC_touching"]), pack_row(cases["C_r5_d2"])
-    assert {f"{law}: k0" for law in LAWS} < set(intact)
-    assert intact["lubrication: k0"] == pytest.approx(1.0, abs=0.01)
-    assert math.isnan(intact[FINEST])
-    for pair in (ARCHIE, FINEST):
-        assert damaged[pair] == pytest.approx(1.0, abs=0.09)
-        assert damaged[f"{pair}: k"] == pytest.approx(damaged[pair], abs=0.01)
-    assert damaged["thesis + thesis"] > 1.25
-    pack = cases["C_r5_d2"].pack
-    result = analyse(pack, periodic="xyz", walls="slip", damage_law="all-spheres")
-    assert damaged[f"{FINEST}: k"] == pytest.approx(result.k_damaged / cases["C_r5_d2"].k)
 
 
 def test_laws_on_a_slab():

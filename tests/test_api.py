@@ -7,7 +7,6 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import fields, is_dataclass
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
@@ -128,6 +127,7 @@ def workplace(tmp_path_factory, root):
 
 
 @pytest.mark.liggghts
+@pytest.mark.nightly
 def test_examples_run(workplace, monkeypatch):
     monkeypatch.chdir(workplace)
     monkeypatch.setenv("MPLBACKEND", "Agg")
@@ -137,34 +137,3 @@ def test_examples_run(workplace, monkeypatch):
         report: list[str] = []
         doctest.DocTestRunner(optionflags=FLAGS).run(example, out=report.append)
         assert not report, "".join(report)
-
-
-def array_owners() -> dict[str, type]:
-    """Every data class of spheres and networks with a field that is an array, but private ones."""
-    owners = {}
-    for path in sorted([*PACKAGE.glob("network/**/*.py"), *PACKAGE.glob("spheres/*.py")]):
-        name = ".".join(["fdnet", *path.relative_to(PACKAGE).with_suffix("").parts])
-        if "Array" not in path.read_text() or path.name == "__init__.py":
-            continue
-        for value in vars(import_module(name)).values():
-            if inspect.isclass(value) and is_dataclass(value) and value.__module__ == name:
-                types = " ".join(str(field.type) for field in fields(value))
-                if value.__name__[0] != "_" and "ndarray" in types:
-                    owners[value.__name__] = value
-    return owners
-
-
-def test_owners_of_arrays_print_on_one_short_line():
-    """The representation that `dataclass` makes prints whole arrays."""
-    owners = array_owners()
-    assert {"Snapshot", "Network", "Occupancy", "Flow", "Analysis"} <= set(owners)
-    assert not [name for name, one in owners.items() if hasattr(one.__repr__, "__wrapped__")]
-    spheres = lattice()
-    result = fdnet.analyse(spheres, periodic="yz", sections=2)
-    for owner in (spheres, result, result.network, result.flow_initial, result.profile):
-        text = repr(owner)
-        assert "\n" not in text
-        assert len(text) < 700, text
-        assert text.startswith(type(owner).__name__)
-    assert "27 grains, 0 fines" in repr(spheres)
-    assert f"{result.k_initial:.4g} m2" in repr(result)

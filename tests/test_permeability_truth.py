@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fdnet.cli import main
-from fdnet.names import ALL_SPHERES, AUTO, DAMAGE_LAW_NAMES, DEFAULT_LAW, LAW_NAMES, SECTION_ARCHIE
+from fdnet.names import ALL_SPHERES, AUTO, DEFAULT_LAW, SECTION_ARCHIE
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
 from fdnet.spheres.snapshot import KIND_NAMES, Kind
 from validation.truth import cases
@@ -65,11 +65,6 @@ def test_packs_lattices_and_losses_are_within_the_stated_error(run, names):
     assert math.hypot(*off[True]) < 0.05 * math.sqrt(len(off[True]))
 
 
-def test_names_offered_are_the_laws_there_are():
-    assert set(LAW_NAMES) == set(LAWS)
-    assert set(DAMAGE_LAW_NAMES) == {AUTO, ALL_SPHERES, *DAMAGE_LAWS}
-
-
 def test_compared_laws_give_what_each_gives_alone(run, small, tmp_path):
     table = tmp_path / "laws.csv"
     result = run(small, "--compare-laws", "--sections", "2", "--csv", str(table))
@@ -92,15 +87,3 @@ def test_compared_laws_give_what_each_gives_alone(run, small, tmp_path):
     assert written == pytest.approx(
         {pair: one["k_damaged_m2"] for pair, one in pairs.items()}, rel=1e-8
     )
-
-
-def test_sections_in_place_recombine_in_series(run, small):
-    """L / k = sum of dx / k over the sections, damaged and not, with walls and without."""
-    for periodic, axis in (("xyz", "x"), ("yz", "x"), ("xy", "z"), ("", "y")):
-        result = run(small, "--sections", "4", "--axis", axis, "--periodic", periodic)
-        for name in ("initial", "damaged"):
-            rows = result["sections"]
-            thickness = [row["x_hi_m"] - row["x_lo_m"] for row in rows]
-            k = [row[f"k_{name}_inplace_m2"] for row in rows]
-            series = sum(dx / one for dx, one in zip(thickness, k, strict=True))
-            assert sum(thickness) / series == pytest.approx(result[f"k_{name}_m2"], rel=1e-9)

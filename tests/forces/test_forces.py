@@ -1,7 +1,6 @@
 """Forces of the fluid on fines: alone, in a crowd, in a throat; closed forms, Stokes flow."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,17 +14,14 @@ from fdnet.scales.drag import (
     MOST_REYNOLDS,
     SOLVED,
     Crowd,
-    arrival_velocity,
     balanced_slip,
     bed_factor,
     crowd_drag_factor,
     drag_factor,
     held_factor,
-    pore_width,
     push_of,
     size_factor,
     slope_factor,
-    throat_width,
 )
 from fdnet.scales.flow import Losses, ergun_inertia, straight
 from fdnet.scales.scales import scales_of
@@ -33,10 +29,6 @@ from fdnet.scales.table import scale_rows
 
 ON = "drag.pressure_gradient=true"
 NAUMANN = "drag.inertia=schiller-naumann"
-
-
-def warned(word, *assignments):
-    return [one for one in scales_of(tiny(*assignments)).warnings if word in one]
 
 
 def values_of(case):
@@ -79,20 +71,6 @@ def test_the_push_is_drag_and_gradient_and_each_estimate_has_it():
     assert on.time_step == off.time_step
 
 
-def test_a_fine_gains_speed_across_a_pore_and_never_more_than_its_drift():
-    case, scales = tiny(ON), scales_of(tiny(ON))
-    push = push_of(case, scales.interstitial_velocity, scales.pressure_gradient)
-    width = pore_width(scales.porosity, case.grains.sauter_diameter_m)
-    gained = math.sqrt(push.velocity**2 + 2 * push.gradient / 2146 * width)
-    assert arrival_velocity(push, 0.05e-3, 2146, width) == pytest.approx(gained)
-    assert arrival_velocity(push, 0.05e-3, 2146, 1.0) == pytest.approx(scales.drift_velocity)
-    assert arrival_velocity(replace(push, gradient=0.0), 0.05e-3, 2146, width) == push.velocity
-    rest = scales_of(tiny()).impact_overlap
-    assert scales.impact_overlap / rest == pytest.approx(gained / push.velocity)
-    porosity = 1 - math.pi / 6  # one sphere of diameter d a cube d: 4 (d^3 - V) / (pi d^2)
-    assert pore_width(porosity, 2.0) == pytest.approx(4 * porosity * 8 / (math.pi * 4))
-
-
 def test_schiller_and_naumann_by_hand_and_within_their_range():
     """At Re 1 the drag is 15 % above Stokes's; at 800 the coefficient is 0.47 (Newton: 0.44)."""
     assert drag_factor(0.0) == 1.0
@@ -107,53 +85,6 @@ def test_schiller_and_naumann_by_hand_and_within_their_range():
         slip = balanced_slip(3.0, reynolds)
         assert slip * drag_factor(min(reynolds * slip / 3.0, 800.0)) == pytest.approx(3.0)
         assert slip <= 3.0
-
-
-def test_inertia_is_in_push_drift_and_steps():
-    """Explicit drag is bounded by the relaxation time at the largest slip."""
-    plain, fast = scales_of(tiny()), scales_of(tiny(NAUMANN))
-    factor = 1 + 0.15 * plain.reynolds**0.687
-    assert fast.drag_overlap == pytest.approx(factor * plain.drag_overlap)
-    slope = 1 + 0.15 * 1.687 * plain.reynolds**0.687
-    assert fast.hold_steps == pytest.approx(plain.hold_steps / slope, abs=1)
-    drifting = scales_of(tiny(ON, NAUMANN))
-    slip = drifting.drift_velocity - drifting.interstitial_velocity
-    stokes = scales_of(tiny(ON)).drift_velocity - plain.interstitial_velocity
-    reynolds = plain.reynolds * slip / plain.interstitial_velocity
-    assert slip * (1 + 0.15 * reynolds**0.687) == pytest.approx(stokes)
-
-
-def test_reynolds_numbers_beyond_stokes_are_warned_of_or_refused():
-    (text,) = warned("Reynolds", "fluid.velocity_m_s=2.0")
-    reynolds = 1095 * 2.0 * 1e-4 / 0.05
-    assert f"is {1 + 0.15 * reynolds**0.687:.3g} times as large" in text
-    assert text.endswith('set drag.inertia = "schiller-naumann"')
-    (text,) = warned("Reynolds", "fluid.velocity_m_s=2.0", "drag.scheme=viscous")
-    assert text.endswith('set drag.inertia = "schiller-naumann" with drag.scheme = "held"')
-    assert not warned("Reynolds", "fluid.velocity_m_s=0.4")
-    assert not warned("Reynolds", "fluid.velocity_m_s=2.0", NAUMANN)
-    thin = "fluid={velocity_m_s=2.0, viscosity_cP=0.2}"
-    (text,) = warned("Reynolds", thin)
-    assert text.endswith(
-        "is outside the range of Stokes drag (below 1) and of Schiller and Naumann's (below 800)"
-    )
-    with pytest.raises(CaseError, match="particle Reynolds number 1095: the drag of Schiller"):
-        scales_of(tiny(thin, NAUMANN))
-    dense = ("grains.count=80", "fines.radius_mm=0.2", "fines.count=20")
-    fast = "fluid={velocity_m_s=3.6, viscosity_cP=2.0}"
-    (text,) = warned("Reynolds", fast, ON, NAUMANN, *dense)
-    assert "of a fine that drifts freely is outside" in text
-
-
-def test_a_driven_fluid_has_the_same_ratios_of_forces_and_its_own_reynolds_number():
-    """Twice as fast as the fluid: every force is twice as large, and so is the drift."""
-    slow = ("fluid.velocity_m_s=0.05", ON, NAUMANN)
-    own, driven = scales_of(tiny(*slow)), scales_of(tiny(*slow, "drag.drive_velocity_m_s=0.1"))
-    assert driven.force_factor == pytest.approx(2.0)
-    assert driven.push.force(5e-5) == pytest.approx(2 * own.push.force(5e-5))
-    assert driven.drift_velocity == pytest.approx(2 * own.drift_velocity)
-    assert driven.push.relaxation_share(5e-5) == pytest.approx(own.push.relaxation_share(5e-5))
-    assert driven.gradient_over_drag == pytest.approx(own.gradient_over_drag)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -173,15 +104,6 @@ def test_the_bed_of_cfdem_by_ergun():
     assert lifted == pytest.approx(0.01454, rel=3e-3), "the tutorial leaves the inertial term out"
     slow = Losses(viscous=1.5e3 / permeability, inertial=inertial)
     assert slow.velocity(weight, straight(1.0)) * 1e6 == pytest.approx(0.01454, abs=5e-6)
-
-
-def test_a_lone_sphere_feels_stokes_or_schiller_and_naumann():
-    """The law's Reynolds part was fitted to beds; at one sphere it is within 16 % up to 100."""
-    assert crowd_drag_factor(Crowd(porosity=1.0)) == pytest.approx(1.0)
-    crowd = Crowd(porosity=1 - 1e-10, size_ratio=np.ones(2))
-    assert crowd_drag_factor(crowd) == pytest.approx(1.0, abs=1e-4)
-    for reynolds in (1.0, 10.0, 100.0):
-        assert bed_factor(1.0, reynolds) == pytest.approx(1 + 0.15 * reynolds**0.687, rel=0.16)
 
 
 def test_the_forces_on_a_bed_are_its_pressure_drop():
@@ -292,20 +214,3 @@ def test_the_drag_in_a_tube_is_that_of_stokes_equations():
     for bad in (-0.1, 0.91, float("nan")):
         with pytest.raises(CaseError, match="a wider one closes the throat"):
             held_factor(bad)
-
-
-def test_the_walls_of_a_throat_are_a_row_and_a_warning():
-    """phi D^2 / 32 is the permeability of straight tubes (Poiseuille)."""
-    assert 0.4 * throat_width(0.4, 2.5e-10) ** 2 / 32 == pytest.approx(2.5e-10)
-    keys = ("fines.radius_mm=0.03", "fines.count=100")
-    scales, rows = scales_of(tiny(*keys)), values_of(tiny(*keys))
-    ratio = 0.06e-3 / throat_width(scales.porosity, scales.permeability)
-    assert rows["largest fine over throat"] == pytest.approx(ratio)
-    assert rows["drag in a throat over a lone sphere's"] == pytest.approx(held_factor(ratio))
-    (text,) = warned("throat", *keys)
-    assert f"feels {held_factor(ratio):.2g} times" in text
-    wide = ("fines.radius_mm=0.08", "fines.count=20")  # as wide as the throats
-    (text,) = warned("throat", *wide)
-    assert "closes" in text
-    assert "drag in a throat over a lone sphere's" not in values_of(tiny(*wide))
-    assert not warned("throat", "fines.radius_mm=0.01")

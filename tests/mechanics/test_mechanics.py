@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fdnet.errors import CaseError, MechanicsError
+from fdnet.errors import MechanicsError
 from fdnet.mechanics.elastic import elastic_of
 from fdnet.mechanics.springs import (
     Cement,
-    Moduli,
     PackMaterial,
-    anisotropy_of,
     bond_springs,
     bond_stress,
     direct_solver,
@@ -20,7 +18,6 @@ from fdnet.mechanics.springs import (
     iterative_solver,
     kinematics,
     stiffness_matrix,
-    voigt_average,
     young_along,
 )
 from fdnet.mechanics.triaxial import (
@@ -36,25 +33,12 @@ from fdnet.mechanics.triaxial import (
     triaxial,
 )
 from fdnet.spheres.snapshot import resting
+from tests.network import packs
 
 R = 0.3e-3
 ALL, NONE = (True, True, True), (False, False, False)
 SPRINGS = PackMaterial(normal=3e6, shear=1e6)
 SAND = PackMaterial(normal=5e7, shear=2e7, friction=0.5)
-
-
-def lattice(basis, side, cells):
-    corner = np.indices((cells,) * 3).reshape(3, -1).T
-    place = (corner[:, None] + np.array(basis)[None]).reshape(-1, 3) * side
-    return resting(place, np.full(len(place), R), np.array([[0, cells * side]] * 3))
-
-
-def simple_cubic():
-    return lattice([[0, 0, 0]], 2 * R, 4)
-
-
-def face_centred():
-    return lattice([[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]], 8**0.5 * R, 3)
 
 
 def random_pack(count=150):
@@ -127,14 +111,14 @@ def test_lattices_in_closed_form():
 
     Face-centred: C11 = kn + ks, C12 = (kn - ks) / 2, C44 = (kn + ks) / 2, over sqrt(2) R.
     """
-    tensor = elastic_of(simple_cubic(), SPRINGS, periodic=ALL).tensor * 2 * R
+    tensor = elastic_of(packs.simple_cubic(4, R), SPRINGS, periodic=ALL).tensor * 2 * R
     expected = np.diag([3e6] * 3 + [0.5e6] * 3)
     assert np.allclose(tensor, expected, rtol=0, atol=1e-6 * 3e6)
-    tensor = elastic_of(face_centred(), SPRINGS, periodic=ALL).tensor * 2**0.5 * R
+    tensor = elastic_of(packs.face_centred(3, R), SPRINGS, periodic=ALL).tensor * 2**0.5 * R
     assert tensor[[0, 0, 3], [0, 1, 3]] == pytest.approx([4e6, 1e6, 2e6], rel=1e-8)
     cement, area = Cement(radius_ratio=0.5, normal=8e13, shear=2e13), np.pi * (0.5 * R) ** 2
     glued = replace(SPRINGS, cement=cement)
-    tensor = elastic_of(simple_cubic(), glued, periodic=ALL).tensor * 2 * R
+    tensor = elastic_of(packs.simple_cubic(4, R), glued, periodic=ALL).tensor * 2 * R
     assert tensor[0, 0] == pytest.approx(3e6 + 8e13 * area, rel=1e-8)
     assert tensor[3, 3] == pytest.approx((1e6 + 2e13 * area) / 2, rel=1e-8)
 
@@ -166,28 +150,16 @@ def test_a_random_pack_is_softer_than_its_affine_bound_in_any_numbering_and_unit
 
 
 def test_rattlers_are_counted_and_a_layer_that_touches_nothing_is_refused_by_its_axis():
-    pack = face_centred()
+    pack = packs.face_centred(3, R)
     result = elastic_of(pack, SPRINGS, periodic=ALL)
     assert (result.rattlers, result.coordination) == (0, 12)
     place = np.vstack([pack.position, pack.position[0] + [0.1 * R, 0, 0]])
     loose = resting(place, np.append(pack.radius, 0.05 * R), pack.box)
     assert elastic_of(loose, SPRINGS, periodic=ALL).rattlers == 1
-    place = simple_cubic().position
+    place = packs.simple_cubic(4, R).position
     box = np.array([[0, 8 * R], [0, 8 * R], [0, 16 * R]])
     with pytest.raises(MechanicsError, match="no load along z"):
         elastic_of(resting(place[place[:, 2] < R], R, box), SPRINGS, periodic=ALL)
-
-
-def test_constants_of_a_cubic_tensor():
-    """Hill (1952): K = (C11 + 2 C12) / 3, G_V = (C11 - C12 + 3 C44) / 5; E along an axis."""
-    tensor = np.diag([6.0] * 3 + [4.0] * 3)
-    tensor[:3, :3] += 5.0
-    averaged = voigt_average(tensor)
-    assert (averaged.bulk, averaged.shear) == (pytest.approx(7.0), pytest.approx(3.6))
-    assert young_along(tensor)[0] == pytest.approx(6 * 21 / 16)
-    reuss = 5 / (2 * 2 / 6 + 3 / 4)
-    assert anisotropy_of(tensor) == pytest.approx(5 * 3.6 / reuss - 5)
-    assert Moduli(7.0, 3.6).young == pytest.approx(9 * 7 * 3.6 / (21 + 3.6))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -205,13 +177,6 @@ def strained(pack, material, strain):
     load = Load(strain=np.array([strain, 0, 0]), stress=np.zeros(3), drag=1e-3, within=1e-12)
     motion, given, _ = balance(loaded, load)
     return loaded, *carried_out(loaded, motion, given)
-
-
-def test_a_contact_opens_and_pulls_nothing():
-    pack = at_rest(column(), SAND, ALL, relieved=True)
-    _, pushed, forces = strained(pack, SAND, -1e-4)
-    assert forces.normal.max() == pytest.approx(5e7 * 1e-4 * 2 * R, rel=1e-6)
-    assert strained(pushed, SAND, 3e-4)[2].normal.max() == 0
 
 
 def test_bonds_break_in_tension_and_shear_at_their_strength():
@@ -236,7 +201,7 @@ def test_bonds_break_in_tension_and_shear_at_their_strength():
 def test_a_simple_cubic_lattice_bears_an_oedometer_as_its_springs():
     """Axial stress kn / a times the strain; the sides keep the confining stress."""
     test = Triaxial(confining=1e6, strain=1e-4, steps=2, sides=False, tolerance=1e-4)
-    result = triaxial(simple_cubic(), SAND, test, periodic=ALL)
+    result = triaxial(packs.simple_cubic(4, R), SAND, test, periodic=ALL)
     last = result.rows[-1]
     assert last.axial - 1e6 == pytest.approx(5e7 / (2 * R) * 1e-4, rel=1e-3)
     assert last.side == pytest.approx(1e6, rel=1e-3)
@@ -260,14 +225,6 @@ def test_dense_sand_yields_at_the_ratio_of_its_friction():
     peaks = [triaxial(pack, one, test, periodic=ALL).peak for one in materials]
     low, high = (peak.axial / peak.side for peak in peaks)
     assert 1.2 < low < 0.9 * high < 4.0
-
-
-def test_stresses_and_packs_that_cannot_be_tested_are_refused():
-    with pytest.raises(CaseError, match="expected at most 5 %"):
-        triaxial(random_pack(60), SAND, Triaxial(confining=5e10), periodic=ALL)
-    far = resting(column().position, 0.8 * R, column().box)
-    with pytest.raises(MechanicsError, match="has no contacts"):
-        triaxial(far, SAND, Triaxial(confining=1e6), periodic=ALL)
 
 
 def test_a_pack_that_falls_apart_under_its_stress_is_refused_with_advice():

@@ -105,11 +105,9 @@ def test_bad_keys_and_tests_are_refused(packed, capsys, tmp_path):
         (with_keys("bonds.tensile_strength_MPa=5"), "bonds.radius_ratio: missing"),
         (with_keys("bonds.radius_ratio=1.5"), "less than or equal to 1"),
         (with_keys("grains.radius_mm=0.2"), "belongs to another case"),
-        (with_keys("bonds.width=1"), "unknown key"),
         *((["--confining_MPa", value], stress) for value in ("-1", "0", "nan")),
         (["--triaxial"], "give --confining_MPa"),
         (["--triaxial", "--confining_MPa", "1", "--strain", "0.9"], "--strain: 0.9"),
-        (["--triaxial", "--confining_MPa", "1", "--steps", "0"], "--steps: 0"),
         (["--triaxial", "--confining_MPa", "1e6"], "expected at most 5 %"),
     ]:
         assert main(["mechanics", str(packed), *arguments]) == 2, arguments
@@ -122,15 +120,8 @@ def test_bad_keys_and_tests_are_refused(packed, capsys, tmp_path):
     assert "carries no load along x" in capsys.readouterr().err
 
 
-def test_bonds_change_no_digest_and_one_strength_alone_is_refused():
-    bonded = case_from(PLAIN | {"bonds": {"radius_ratio": 0.5}})
-    assert bonded.digest() == case_from(PLAIN).digest()
-    with pytest.raises(CaseError, match=r"bonds.shear_strength_MPa: missing"):
-        case_from(PLAIN | {"bonds": {"radius_ratio": 0.5, "tensile_strength_MPa": 3.0}})
-
-
 @pytest.mark.liggghts
-def test_the_report_gets_its_section_unless_the_numbers_are_spoilt(packed, tmp_path, capsys):
+def test_the_report_gets_its_section_unless_the_numbers_are_spoilt(packed, tmp_path):
     page = tmp_path / "report.html"
     old = "<!-- mechanics begins -->\nformer\n<!-- mechanics ends -->"
     page.write_text(f"<p>one</p>\n{old}\n<p>two</p>")
@@ -140,33 +131,11 @@ def test_the_report_gets_its_section_unless_the_numbers_are_spoilt(packed, tmp_p
     assert "former" not in text
     assert text.startswith("<p>one</p>")
     assert text.endswith("<p>two</p>")
-    run = tmp_path / "run"
-    shutil.copytree(packed, run)
-    for content, words in [
-        (b"<p>\xff</p>", "report.html: cannot be read as a page"),
-        (b"<p>mine</p>", "has no place for the mechanics"),
-    ]:
-        (run / "report.html").write_bytes(content)
-        assert main(["mechanics", str(run)]) == (0 if b"mine" in content else 2)
-        assert words in capsys.readouterr().err
-    path = run / "mechanics" / "mechanics.json"
+    spoilt = tmp_path / "mechanics"
+    shutil.copytree(packed / "mechanics", spoilt)
+    path = spoilt / "mechanics.json"
     whole = json.loads(path.read_text())
-    spoilt = [
-        *(
-            {k: v for k, v in whole.items() if k != gone}
-            for gone in ("bulk_modulus_Pa", "warnings")
-        ),
-        whole | {"warnings": "none"},
-        whole | {"young_modulus_Pa": "stiff"},
-        whole | {"poisson_ratio": float("nan")},
-        whole | {"triaxial": [1]},
-        [1],
-    ]
-    for content in (*(json.dumps(one).encode() for one in spoilt), b"", b"{\xff}", None):
-        path.unlink()
-        if content is None:
-            path.mkdir()
-        else:
-            path.write_bytes(content)
+    for content in (whole | {"young_modulus_Pa": "stiff"}, whole | {"triaxial": [1]}, [1]):
+        path.write_text(json.dumps(content))
         with pytest.raises(CaseError, match=r"mechanics\.json: .*measure it anew"):
-            mechanics_html(run / "mechanics")
+            mechanics_html(spoilt)

@@ -65,17 +65,3 @@ def chain(count: int, *, step: float = 1.0) -> Network:
     )
     pairs = np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
     return network_of(position, pairs, [[0, count * step], [0, 1], [0, 1]])
-
-
-def random_network(count: int = 30, *, seed: int = 3) -> tuple[Network, Array]:
-    """Random pores with three links each, and log-uniform conductances over six decades.
-
-    Some pores lie on the faces.
-    """
-    rng = np.random.default_rng(seed)
-    position = rng.random((count, 3))
-    position[:4, 0], position[4:8, 0] = 0.0, 1.0
-    pairs = np.array(
-        [(i, j) for i in range(count) for j in rng.choice(count, 3, replace=False) if i < j]
-    )
-    return network_of(position, pairs, [[0, 1]] * 3), 10.0 ** rng.uniform(-6, 0, len(pairs))

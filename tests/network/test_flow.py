@@ -17,7 +17,7 @@ from fdnet.network.flow.solver import (
 from fdnet.network.laws.named import LAWS, effective_law
 from fdnet.network.network import build_network
 from tests.network.exact import exact_balance, random_links
-from tests.network.networks import chain, network_of, random_network
+from tests.network.networks import chain
 from tests.network.packs import random_pack, snapshot
 
 ALL, SIDES = (True,) * 3, (False, True, True)
@@ -41,41 +41,7 @@ def test_chains_of_throats_in_closed_form():
     assert within.inflow == pytest.approx(1 / 0.4)
 
 
-def test_throats_carry_the_flow_by_their_share_of_the_energy():
-    for resistances, carrying in [
-        ([1, 1, 1, 1], 4.0),
-        ([1, 3], 16 / 10),
-        ([1, 0, 0, 0], 1.0),
-        ([1, 1, 0], 2.0),
-    ]:
-        g = 1.0 / np.maximum(np.array(resistances, float), 1e-9)
-        assert solve_flow(chain(len(g)), g).carrying_throats == pytest.approx(carrying)
-    assert solve_flow(chain(2), np.array([1.0, 0.0])).carrying_throats == 0.0
-
-
-def test_a_random_network_against_the_pseudo_inverse():
-    network, g = random_network()
-    flow = solve_flow(network, g)
-    laplacian = np.zeros((30, 30))
-    np.add.at(laplacian, tuple(network.throat_pores.T), -g)
-    laplacian += laplacian.T
-    np.fill_diagonal(laplacian, -laplacian.sum(axis=1))
-    pressure = np.append(np.ones(4), np.zeros(4))
-    solved = np.linalg.pinv(laplacian[8:, 8:]) @ -laplacian[8:, :8] @ pressure
-    inflow = (laplacian @ np.append(pressure, solved))[:4].sum()
-    assert flow.inflow == pytest.approx(inflow, rel=1e-7)
-    tied = np.isfinite(flow.pore_pressure[8:])
-    assert flow.pore_pressure[8:][tied] == pytest.approx(solved[tied], abs=1e-7)
-    assert flow.mass_balance < 1e-9
-
-
 def test_cut_off_pores_are_counted_and_no_open_path_is_zero_with_its_reason():
-    position = [[0, 0, 0], [1, 0, 0], [0.5, 1, 0], [0.5, 2, 0], [0.5, 3, 0]]
-    network = network_of(position, [(0, 1), (2, 3), (0, 4)], [[0, 1], [0, 3], [0, 1]])
-    flow = solve_flow(network, np.ones(3))
-    assert flow.inflow == pytest.approx(1.0)
-    assert flow.isolated_pores == 3  # two on their own, one dead end that misses the outlet
-    assert np.isnan(flow.pore_pressure[2:]).all()
     periodic = build_network(random_pack(50), periodic=ALL)
     inner = np.where(periodic.throat_shift[:, 0] != 0, 0.0, 1.0)  # nothing crosses the x face
     blocked = [(chain(3), np.array(g, float)) for g in ([0, 1, 1], [1, 0, 1], [0, 0, 0])]
@@ -91,12 +57,6 @@ def test_cut_off_pores_are_counted_and_no_open_path_is_zero_with_its_reason():
     assert k == pytest.approx([1.0, 0.0, 0.0, 1.0])
     in_place = inplace_permeability(network, solve_flow(network, g), np.array([0.0, 0.9, 3.0]))
     assert in_place.tolist() == [0.0, 0.0]
-
-
-def test_a_bad_conductance_is_refused_with_its_throat():
-    for bad in (np.nan, np.inf, -1.0):
-        with pytest.raises(FlowError, match="throat 1"):
-            solve_flow(chain(3), np.array([1.0, bad, 1.0]))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -130,25 +90,6 @@ def test_a_period_is_the_middle_copy_of_three(periods):
         assert solve_flow(one, law(one)).inflow == pytest.approx(middle, rel=0.03), name
 
 
-def test_a_period_across_and_back_is_no_way_round():
-    """Two throats of 1 in parallel that both cross the x face close no loop.
-
-    If one of them does not cross it, they are in series.
-    """
-    for turns, inflow in [((1, 1), 0.0), ((1, 0), 0.5)]:
-        network = network_of(
-            [[0.2, 0, 0], [0.8, 0, 0]],
-            [(0, 1), (0, 1)],
-            [[0, 1]] * 3,
-            periodic=(True, False, False),
-            throat_shift=np.array([[turn, 0, 0] for turn in turns]),
-        )
-        flow = solve_flow(network, np.ones(2))
-        assert flow.inflow == pytest.approx(inflow)
-        assert bool(flow.reason) == (inflow == 0)
-        assert flow.isolated_pores == (2 if inflow == 0 else 0)
-
-
 # ------------------------------------------------------------------------------------------------
 # Direct and multigrid.
 
@@ -160,20 +101,6 @@ def links(count=400):
     pair = np.concatenate([ring, rng.integers(count, size=(count, 2))])
     tied = np.where(np.arange(count) % 10 == 0, 1.0, 0.0)
     return pair, 10.0 ** rng.uniform(-4.0, 0, len(pair)), tied, rng.random(count)
-
-
-def test_both_methods_satisfy_every_balance(monkeypatch):
-    """In any unit of conductance and flux."""
-    pair, g, tied, source = links()
-    for limit, method in ((0, MULTIGRID), (10_000, DIRECT)):
-        monkeypatch.setattr(solver, "DIRECT_UP_TO", limit)
-        for unit in (1e-12, 1.0, 1e12):
-            balances = Balances(pair, g * unit, tied * unit)
-            p = balances.solve(source * unit, imbalance=1e-9 * unit)
-            flux = g * (p[pair[:, 0]] - p[pair[:, 1]])
-            net = np.bincount(pair[:, 0], flux, 400) - np.bincount(pair[:, 1], flux, 400)
-            assert net + tied * p == pytest.approx(source, abs=1e-8), (method, unit)
-            assert balances.method == method
 
 
 def test_multigrid_and_direct_agree_on_packs_and_both_balance(monkeypatch):
@@ -258,37 +185,8 @@ def test_fluxes_against_rational_arithmetic(period):
         assert solved > 15
 
 
-def test_chains_and_groups_sixteen_decades_apart():
-    """Resistances add, every link takes the same flux, parallel paths share as they conduct."""
-    for g in (
-        np.array([1e-16, 1.0, 1e-8, 1.0, 1e-16]),
-        10.0 ** -np.array([0, 4, 8, 12, 16, 12, 8, 4, 0]),
-    ):
-        flow = solve_flow(chain(len(g)), g)
-        assert flow.inflow == pytest.approx(1.0 / np.sum(1.0 / g), rel=1e-12)
-        assert flow.throat_flux == pytest.approx(flow.inflow, rel=1e-9)
-    position = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]
-    network = network_of(position, [(0, 1), (1, 2), (1, 2), (2, 3)], [[0, 3], [0, 1], [0, 1]])
-    flow = solve_flow(network, np.array([1.0, 1e12, 3e12, 1.0]))
-    assert flow.throat_flux / flow.inflow == pytest.approx([1.0, 0.25, 0.75, 1.0], rel=1e-9)
-    # two pores joined by 1 and tied to the flow by 1e-18 have the pressure of their neighbour
-    position = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0], [1, 2, 0]]
-    network = network_of(position, [(0, 1), (1, 2), (1, 3), (3, 4)], [[0, 2], [0, 3], [0, 1]])
-    flow = solve_flow(network, np.array([1.0, 1.0, 1e-18, 1.0]))
-    assert flow.pore_pressure[1:] == pytest.approx([0.5, 0.0, 0.5, 0.5], abs=1e-9)
-
-
-def test_contrasts_settle_or_are_refused(monkeypatch):
-    """A group contracted by 1.5e8 includes the link of 0.9e8 in parallel.
-
-    Otherwise each sweep gains a factor of only 0.6. Without contraction sixteen decades cannot be
-    held: no number is better than a wrong one.
-    """
-    monkeypatch.setattr(solver, "CONTRASTS", (1e8,))
-    ends, jump = np.array([(0, 1), (1, 2), (1, 2), (2, 0)]), np.array([1.0, 0.0, 0.0, 0.0])
-    balance = balance_links(ends, np.array([1.0, 1.5e8, 0.9e8, 1.0]), jump, 3)
-    assert balance.defect < 1e-8
-    assert balance.flux == pytest.approx([0.5, 0.5 * 1.5 / 2.4, 0.5 * 0.9 / 2.4, 0.5], abs=1e-7)
+def test_contrasts_that_cannot_be_held_are_refused(monkeypatch):
+    """Without contraction of strong groups: no number is better than a wrong one."""
     monkeypatch.setattr(solver, "CONTRASTS", (1e99,))
     with pytest.raises(FlowError):
         solve_flow(chain(9), np.array([1e10, 1e6, 1e2, 1e-12, 1e-16, 1e-12, 1e2, 1e6, 1e10]))

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import cumulative_trapezoid
 
 from fdnet.network.laws import deposit_resistances as deposit
 from fdnet.network.laws import wedges
-from fdnet.network.laws.reaching_grains import ray_room, share_of_cut
 from tests.network.sections import (
     edge_flux,
     even_flux,
@@ -21,11 +19,6 @@ from tests.network.wedge_table import exact_flux
 EQUAL_SIDES = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]])
 RIGHT_ISOSCELES = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
 ACUTE = np.array([[0.0, 0.0], [2.0, 0.0], [1.1175, 1.7808]])
-
-
-def triangle(a, b, c):
-    x = (a * a + b * b - c * c) / (2.0 * a)
-    return np.array([[0.0, 0.0], [a, 0.0], [x, np.sqrt(b * b - x * x)]])
 
 
 # ------------------------------------------------------------------------------------------------
@@ -80,44 +73,6 @@ def test_the_rule_of_tubes_against_the_exact_hyperboloid():
         assert 2.0 * total == pytest.approx(3 / ((1 - q) ** 2 * (1 + 2 * q)), rel=bound), q
 
 
-def sideways(rho, step=1e-4):
-    """What the resistance has more, over (da/dz)^2 and that of a straight cell of radius 1."""
-    r = np.linspace(rho, 1.0, 4001)
-
-    def speed(at, radius):
-        return np.where(at > radius, 0.5 * np.log(at / radius) - (at**2 - radius**2) / 4.0, 0.0)
-
-    def flux(radius):
-        fine = np.linspace(radius, 1.0, 8001)
-        return np.trapezoid(speed(fine, radius) * 2.0 * np.pi * fine, fine)
-
-    def width(radius):
-        """Radius a of the tube that carries as much as the half of a cell, a triangle's share."""
-        return (4.0 * flux(radius) / np.pi) ** 0.25
-
-    # what the flow along the cell gains between the rim and r comes in sideways through r
-    here = speed(r, rho) / flux(rho)
-    change = (speed(r, rho + step) / flux(rho + step) - here) / step
-    inward = -cumulative_trapezoid(change * r, r, initial=0.0) / r
-    sheared = np.trapezoid(2.0 * (np.gradient(inward, r) ** 2 + (inward / r) ** 2) * r, r)
-    straight = np.trapezoid(np.gradient(here, r) ** 2 * r, r)
-    slope = (width(rho + step) - width(rho - step)) / (2.0 * step)
-    return sheared / straight / slope**2
-
-
-def test_the_widening_of_an_open_section():
-    """Fluid in the cell of a cylinder whose radius varies along it, without shear at its edge.
-
-    The velocity along the cell is that of Happel (1959). What flows sideways makes up for its
-    change, and its dissipation is what the resistance has more, to second order.
-    """
-    shares = {0.2: 0.58, 0.3: 0.64, 0.4: 0.65, 0.5: 0.63, 0.6: 0.59, 0.7: 0.52}
-    for narrow, share in shares.items():
-        got = sideways(narrow)
-        assert got == pytest.approx(share * wedges.WIDENING / 2.0, rel=0.01), narrow
-        assert got == pytest.approx(wedges.OPEN_WIDENING / 2.0, rel=0.13), narrow
-
-
 # ------------------------------------------------------------------------------------------------
 # Sections between three grains.
 
@@ -136,10 +91,8 @@ def test_equal_discs_against_finite_elements():
     for disc in (0.3, 0.7, 0.93):
         exact = resolved_flux(ACUTE, np.full(3, disc))
         assert even_flux(ACUTE, disc) == pytest.approx(exact, rel=0.01), disc
-    for side in [(2.0, 2.1, 2.3), (2.0, 2.0, 2.7), (2.0, 2.0, 2.82)]:
-        base = triangle(*side)
-        uneven = uneven_flux(base, np.full(3, 0.93))
-        assert uneven == pytest.approx(even_flux(base, 0.93), rel=1e-4), side
+    uneven = uneven_flux(ACUTE, np.full(3, 0.93))
+    assert uneven == pytest.approx(even_flux(ACUTE, 0.93), rel=1e-4)
 
 
 def test_equal_discs_in_an_obtuse_triangle_against_finite_elements():
@@ -150,21 +103,12 @@ def test_equal_discs_in_an_obtuse_triangle_against_finite_elements():
             discs = np.full(3, disc)
             ratio = uneven_flux(base, discs) / resolved_flux(base, discs)
             assert ratio == pytest.approx(1.0, abs=0.13), (edge, disc)
-    base = triangle(2.0, 2.0, 3.2)
-    assert even_flux(base, 0.93) < 0.0 < uneven_flux(base, np.full(3, 0.93)) < 2e-2
-    fluxes = []
-    for angle in np.radians(np.arange(87.0, 97.0, 0.25)):  # no jump on the way
-        base = np.array([[0.0, 0.0], [2.0, 0.0], [2.0 * np.cos(angle), 2.0 * np.sin(angle)]])
-        fluxes.append(uneven_flux(base, np.full(3, 0.6)))
-    assert np.all(np.abs(np.diff(np.log(fluxes))) < 0.02)
 
 
 def test_unequal_discs_against_finite_elements():
     """The law over finite elements; rays give the last (docs/physics_network.md)."""
     for edge, apex, disc, ratio in [
         (1.0, (0.5, 0.4), (0.5, 0.5, 0.1), 0.98),
-        (1.2, (0.6, 0.5), (0.5, 0.5, 0.1), 0.99),
-        (1.2, (0.8, 0.5), (0.5, 0.5, 0.1), 1.03),
         (1.2, (0.6, 0.2), (0.5, 0.5, 0.1), 0.94),
         (0.7, (0.35, 0.7), (0.1, 0.1, 0.5), 1.12),
     ]:
@@ -178,8 +122,6 @@ def test_sections_whose_signed_shares_cancel_are_summed_over_rays():
     for apex, disc, ratio in [
         ((1.098, 0.706), (0.560, 0.374, 0.184), 0.96),
         ((1.000, 0.513), (0.601, 0.309, 0.058), 0.98),
-        ((1.172, 0.252), (0.463, 0.077, 0.079), 0.93),
-        ((1.142, 0.305), (0.754, 0.182, 0.144), 0.94),
         ((1.144, 0.308), (0.420, 0.141, 0.118), 0.93),
     ]:
         base, discs = np.array([[0.0, 0.0], [1.0, 0.0], apex]), np.array(disc)
@@ -191,30 +133,6 @@ def test_sections_whose_signed_shares_cancel_are_summed_over_rays():
     assert uneven_flux(2.0 * EQUAL_SIDES, np.full(3, 1.2)) == 0.0
 
 
-def test_a_grain_that_a_plane_cuts_against_finite_elements():
-    """The disc on the corner is 3 to 38 % off, that of the grain itself at most 3 %."""
-    room = np.empty((2, 3, 3)), ray_room(0), wedges.ratio_table()
-    base, share = np.array([[0.0, 0.0], [1.0, 0.0], [0.45, 0.85]]), from_python(share_of_cut)
-    for away, radius, stand_in in [
-        ((-0.1, -0.05), 0.45, 0.4),
-        ((-0.15, -0.1), 0.5, 0.4),
-        ((0.0, -0.3), 0.5, 0.3),
-    ]:
-        corner, own = np.array([stand_in, 0.4, 0.35]), np.array([radius, 0.4, 0.35])
-        cut = np.zeros((3, 4))
-        cut[0] = *away, 0.0, radius
-        exact = resolved_flux(base, own, centre=base + np.array([away, (0, 0), (0, 0)]))
-        flux = uneven_flux(base, corner)
-        assert abs(flux / exact - 1.0) > 0.025
-        assert flux * share(base, corner, 0.0, cut, *room) == pytest.approx(exact, rel=0.03), away
-    # centre 0.2 above the facet, radius 0.5: at the height 0.5 the disc has the radius 0.4
-    corner, cut, flat = np.array([0.3, 0.4, 0.35]), np.zeros((3, 4)), np.zeros((3, 4))
-    cut[0], flat[0] = (0.0, 0.0, 0.2, 0.5), (0.0, 0.0, 0.0, 0.4)
-    there = share(base, corner, 0.5, cut, *room)
-    assert there == pytest.approx(share(base, corner, 0.0, flat, *room), rel=1e-12)
-    assert share(base, corner, 0.1, cut, *room) < there < 1.0
-
-
 # ------------------------------------------------------------------------------------------------
 # Sections beside walls that hold the fluid.
 
@@ -222,9 +140,7 @@ def test_a_grain_that_a_plane_cuts_against_finite_elements():
 def test_half_sections_of_a_wall_against_finite_differences():
     cases = {
         "touching all": ((1.0, 1.0, 2.0), (1.0, 1.0)),
-        "one raised": ((1.0, 1.5, 2.1), (1.0, 1.0)),
         "both raised": ((1.5, 1.5, 2.0), (1.0, 1.0)),
-        "small discs": ((1.0, 1.0, 2.0), (0.5, 0.5)),
         "steep": ((1.0, 2.2, 1.7), (1.0, 1.0)),
         "cut and unequal": ((0.6, 1.3, 2.2), (1.0, 0.7)),
         "on the wall": ((0.0, 1.0, 2.2), (1.0, 1.0)),
@@ -244,19 +160,6 @@ def test_quarter_sections_of_an_edge_against_finite_differences():
             assert edge_flux((1.0, far), disc) == pytest.approx(exact, rel=0.06), (far, disc)
     flux = edge_flux((1.0, 1.0), np.array([1.5, 1.4]))
     assert flux[0] == 0.0 < flux[1], "a disc over the edge of the box leaves nothing"
-
-
-def test_limits_and_symmetry_beside_a_wall():
-    """Between the wall and the free line of centres, L >> H: L H^3 / 3 except near the discs."""
-    for along in (20.0, 30.0, 40.0):
-        flux = wall_flux((1.0, 1.0, along), 0.01, 0.01)
-        assert flux == pytest.approx((along - 1.0) / 3.0, rel=0.05), along
-    one, other = wall_flux((1.0, 1.6, 2.1), 0.9, 0.7), wall_flux((1.6, 1.0, 2.1), 0.7, 0.9)
-    assert one == pytest.approx(other, rel=1e-3)
-    assert wall_flux((0.2, 0.2, 0.5), 1.0, 1.0) == 0.0
-    discs = np.linspace(0.2, 1.0, 9), np.linspace(0.9, 0.1, 9)
-    single = [wall_flux((1.0, 1.6, 2.1), *pair) for pair in zip(*discs, strict=True)]
-    assert wall_flux((1.0, 1.6, 2.1), *discs) == pytest.approx(single, rel=1e-13)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -301,8 +204,6 @@ def test_sections_among_fines_against_finite_elements():
     """A lattice has no flow of shear across the sides of its triangles."""
     for radii, ratio in [
         ((0.4, 0.4, 0.4), 0.99),
-        ((0.3, 0.3, 0.3), 0.96),
-        ((0.5, 0.5, 0.1), 0.91),
         ((0.45, 0.3, 0.1), 0.96),
         ((0.45, 0.45, 0.02), 0.96),
         ((0.45, 0.1, 0.1), 0.92),
@@ -310,20 +211,6 @@ def test_sections_among_fines_against_finite_elements():
         exact = resolved_flux(EQUAL_SIDES, np.array(radii))
         flux = points_flux(EQUAL_SIDES, lattice(radii))
         assert flux / exact == pytest.approx(ratio, abs=0.01), radii
-
-
-def test_the_order_of_corners_and_discs_mirror_and_scale_do_not_matter():
-    """A disc beyond the triangle holds the fluid too; one over all of it leaves nothing."""
-    two = np.array([[0.0, 0.0, 0.3], [1.0, 0.0, 0.3]])
-    near, far = (points_flux(EQUAL_SIDES, np.vstack([two, [0.5, y, 0.3]])) for y in (1.2, 9.0))
-    assert near < far == pytest.approx(points_flux(EQUAL_SIDES, two))
-    assert points_flux(EQUAL_SIDES, [[0.5, 0.3, 2.0]]) == 0.0
-    base, discs = np.array([[0.0, 0.0], [1.3, 0.0], [0.4, 0.8]]), lattice((0.4, 0.3, 0.1))
-    flux = points_flux(base, discs)
-    assert points_flux(base[[1, 2, 0]], discs[::-1]) == pytest.approx(flux, rel=1e-12)
-    mirrored = points_flux(base * [1.0, -1.0], discs * [1.0, -1.0, 1.0])
-    assert mirrored == pytest.approx(flux, rel=1e-12)
-    assert points_flux(3 * base, 3 * discs) == pytest.approx(81 * flux, rel=1e-12)
 
 
 def test_triangles_that_walls_halve_against_finite_differences():
@@ -337,26 +224,3 @@ def test_triangles_that_walls_halve_against_finite_differences():
         exact = 2.0 * resolved_beside_walls((1.3, 1.3, 1.0), (disc, 0.0), edge=True)
         flux = held_flux(base, [[1, 1.3, disc]], [(1, 1.0, 0.0), (2, 1.0, 0.0)])
         assert flux == pytest.approx(exact, rel=0.1), disc
-
-
-def test_walls_and_planes_of_pressure_count_from_where_they_are_near():
-    """A plane holds the fluid along it as walls do, but for the part of the flow square to it."""
-    discs = np.column_stack([EQUAL_SIDES, [0.1, 0.1, 0.1]])
-    flux = [held_flux(EQUAL_SIDES, discs, [(1, 1.0, -gap)]) for gap in (0.0, 0.1, 0.3, 9.0)]
-    assert flux == sorted(flux)
-    assert flux[0] < 0.7 * flux[3]
-    assert flux[3] == held_flux(EQUAL_SIDES, discs, [])
-    discs[1, 2] = 0.2
-    wall = held_flux(EQUAL_SIDES, discs, [(1, 1.0, -0.1)])
-    plane = held_flux(EQUAL_SIDES, discs, [(0, 1.0, -0.1)], AXES[:, [1, 0, 2]])
-    assert plane == pytest.approx(wall, rel=1e-12)
-    discs[:, 2] = 0.05
-
-    def at(uy, uz, below):
-        axes = np.array([[0.0, 1.0, 0.0], [uy, 0.0, uz], [uz, 0.0, -uy]])
-        return held_flux(EQUAL_SIDES, discs, [(0, 1.0, -below)], axes)
-
-    free, along, slope = held_flux(EQUAL_SIDES, discs, []), at(1.0, 0.0, 0.0), np.sqrt(0.5)
-    assert at(0.0, 1.0, 0.1) == at(1.0, 0.0, 99.0) == free
-    assert 0.1 < along / free < 0.8
-    assert at(slope, slope, 0.0) == pytest.approx(0.5 * (free + along), rel=0.02)

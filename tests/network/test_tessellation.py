@@ -1,6 +1,5 @@
 """The network of a pack: exact measures, a tiling of the box, certain signs, nodes, counts."""
 
-from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from itertools import permutations, product
@@ -8,14 +7,12 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 from scipy.optimize import minimize
-from scipy.spatial import ConvexHull, Delaunay
 
-from fdnet.errors import NetworkError
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network
 from fdnet.network.nodes import nodes_of
-from fdnet.network.tessellation import delaunay, triangulation
+from fdnet.network.tessellation import delaunay
 from fdnet.network.tessellation.triangulation import in_sphere, side_of_plane, triangulate
 from fdnet.spheres.geometry import measure_porosity
 from tests.network import closed_forms
@@ -109,16 +106,6 @@ def test_pores_and_throats_of_unequal_overlapping_grains_are_the_closed_forms():
     assert np.abs(network.throat_heights[:, 0]) == pytest.approx(np.abs(own), abs=1e-6)
 
 
-def test_open_area_between_overlapping_discs_against_a_fine_grid():
-    triangle, radius = np.array([[0, 0, 0], [1.8, 0, 0], [0.8, 1.9, 0.0]]), np.array([1, 0.9, 0.7])
-    x, y = np.meshgrid(np.arange(0.0005, 1.8, 0.001), np.arange(0.0005, 1.9, 0.001))
-    inside = (y * 0.8 < x * 1.9) & (y * (0.8 - 1.8) > (x - 1.8) * 1.9)
-    for corner, size in zip(triangle, radius, strict=True):
-        inside &= (x - corner[0]) ** 2 + (y - corner[1]) ** 2 > size**2
-    area = closed_forms.open_area(triangle[None], radius[None])[0]
-    assert area == pytest.approx(inside.sum() * 1e-6, abs=2e-3)
-
-
 def test_void_of_packs_is_their_porosity_by_chords():
     """Also where grains overlap, are unequal, are cut by walls or centred beyond one."""
     walled = random_pack(60, 0.5, periodic=False)
@@ -147,16 +134,6 @@ def test_void_of_packs_is_their_porosity_by_chords():
         assert beyond_walls == (name == "centred beyond a wall"), name
 
 
-def test_wall_surface_hides_the_caps_of_overlapping_pairs():
-    pack = random_pack(80, 0.66)
-    apart = pack.position[:, None] - pack.position[None]
-    apart -= pack.box[:, 1] * np.round(apart / pack.box[:, 1])
-    height = np.maximum(1 - 0.5 * np.linalg.norm(apart, axis=2), 0)[~np.eye(80, dtype=bool)]
-    assert height.sum() > 0.5
-    surface = np.sum(built(80, 0.66).pore_wall_surface)
-    assert surface == pytest.approx(4 * np.pi * 80 - 2 * np.pi * height.sum(), rel=1e-9)
-
-
 def test_tetrahedra_tile_the_box_and_facets_pair():
     """Also few grains in a wide box, where the first images are too few, and a single layer."""
     dense = random_pack(120, 0.5, periodic=False)
@@ -183,97 +160,8 @@ def test_tetrahedra_tile_the_box_and_facets_pair():
             assert len(network.throat_pores) == 2 * len(network.pore_position)
 
 
-def test_throat_ends_are_its_pores_up_to_whole_periods():
-    network = built()
-    size = network.box[:, 1]
-    shift = np.stack([0 * network.throat_shift, network.throat_shift], axis=1) * size
-    place = network.pore_position[network.throat_pores] + shift
-    assert network.throat_ends == pytest.approx(place, abs=1e-9)
-    assert np.all((network.pore_position >= 0) & (network.pore_position < size))
-    # the two places are those next to the facet, not an image of them elsewhere
-    middle = network.throat_corner.mean(axis=1)[:, None]
-    assert np.linalg.norm(network.throat_ends - middle, axis=2).max() < 2.5
-    for side in (0, 1):
-        grains = network.pore_grains[network.throat_pores[:, side]]
-        assert np.all(np.any(grains[:, :, None] == network.throat_grains[:, None], axis=1))
-
-
-def test_pores_on_faces_lie_on_them_and_count_by_their_half():
-    pack = random_pack(100, 0.5, periodic=False)
-    network = build_network(pack, periodic=SIDES, walls="slip")
-    on_face, x = network.pore_share < 1, network.pore_position[:, 0]
-    assert np.all(network.pore_share[on_face] == 0.5)
-    assert set(x[on_face]) == set(network.box[0])
-    assert np.all((x[~on_face] > 0) & (x[~on_face] < network.box[0, 1]))
-    network = build_network(simple_cubic(4), periodic=ONE_WALL, walls="slip")
-    both = np.all(network.pore_share[network.throat_pores] < 1, axis=1)
-    assert set(network.throat_share[both]) == {0.5}
-    assert np.all(network.throat_share[~both] == 1)
-
-
-def test_grains_that_add_nothing_are_left_out_and_counted():
-    """One that is there twice, across the period; one inside another; one out of reach."""
-    for spread, place, radius in ((0.0, None, 1.0), (0.33, [0.3, 0.1, 0.0], 0.4)):
-        pack = random_pack(80, spread=spread)
-        big = pack.position[np.argmax(pack.radius)]
-        more = big + (place or [0, pack.box[1, 1], 0])
-        both = snapshot(np.vstack([pack.position, more]), np.append(pack.radius, radius), pack.box)
-        plain, network = (build_network(one, periodic=ALL) for one in (pack, both))
-        assert plain.counts["grains_hidden"] == plain.counts["grains_inside_others"] == 0
-        assert network.counts["grains_inside_others"] == 1
-        assert network.pore_volume.sum() == pytest.approx(plain.pore_volume.sum(), rel=1e-9)
-    pack = random_pack(60, 0.5, periodic=False)
-    far = snapshot(np.vstack([[[-3.0, 1, 1]], pack.position]), 1.0, pack.box)
-    network, alone = (build_network(one, periodic=NONE, walls="slip") for one in (far, pack))
-    assert network.counts["grains_outside_box"] == 1
-    assert np.array_equal(network.pore_grains, alone.pore_grains + 1)
-    assert np.array_equal(network.throat_grains, alone.throat_grains + 1)
-
-
-def test_slivers_are_counted_where_walls_cut_random_packs():
-    assert built(100).counts["slivers"] == 0
-    assert built(100, 0.58, ONE_WALL).counts["slivers"] > 0
-
-
-def test_heavily_overlapping_grains_close_throats_in_every_law():
-    pack = random_pack(60)
-    network = build_network(replace(pack, radius=pack.radius * 1.25), periodic=ALL)
-    closed = network.throat_radius == 0
-    assert network.counts["throats_closed"] == closed.sum() > 0
-    assert np.all(network.throat_radius >= 0)
-    for name, law in LAWS.items():
-        conductance = law(network)
-        assert np.all(conductance[closed] == 0), name
-        assert np.all(np.isfinite(conductance) & (conductance >= 0)), name
-
-
-def test_bad_packs_and_walls_are_refused():
-    three = snapshot(np.zeros((3, 3)), 0.1, [[0, 10]] * 3)
-    with pytest.raises(NetworkError, match="at least 4"):
-        build_network(three, periodic=NONE, walls="slip")
-    with pytest.raises(NetworkError, match=r"'sticky'.*slip"):
-        build_network(random_pack(60), periodic=NONE, walls="sticky")
-
-
 # ------------------------------------------------------------------------------------------------
 # Power tessellation and the compiled one.
-
-
-def test_power_centres_of_a_body_centred_lattice_of_two_sizes():
-    """The power centre is (a/2, y, 0) with y^2 - R1^2 = (y - a/2)^2 - R2^2.
-
-    The tetrahedron has the corners (0,0,0), (a,0,0) and the centres (a,a,+-a)/2; the powers
-    |x - p|^2 - r^2 are equal.
-    """
-    edge, corner, centre = 2.0, 1.0, 0.7
-    steps = np.indices((3, 3, 3)).reshape(3, -1).T * edge
-    place, radius = np.vstack([steps, steps + 0.5 * edge]), np.repeat([corner, centre], 27)
-    network = build_network(snapshot(place, radius, [[0.0, 3 * edge]] * 3), periodic=ALL)
-    turned = network.pore_power_centre % edge
-    got = np.sort(np.minimum(turned, edge - turned), axis=1)
-    expected = np.sort([edge / 2, edge / 4 + (corner**2 - centre**2) / edge, 0.0])
-    assert got == pytest.approx(np.tile(expected, (len(got), 1)), abs=1e-9)
-    assert len(got) == 12 * 27
 
 
 def test_no_other_grain_has_less_power_at_a_power_centre():
@@ -356,41 +244,6 @@ def test_signs_are_those_of_exact_arithmetic_or_none():
     assert side_of_plane(corners, 0, 1, 2, 3) == 0
 
 
-def rows_of(simplices):
-    return {tuple(row) for row in np.sort(simplices, axis=1).tolist()}
-
-
-def by_qhull(points, square):
-    """Delaunay's tetrahedra, or the lower hull of the points lifted to |x|^2 - r^2."""
-    if np.ptp(square) == 0:
-        return Delaunay(points).simplices
-    about = points - points.mean(axis=0)
-    hull = ConvexHull(np.column_stack([about, np.sum(about**2, axis=1) - square]))
-    return hull.simplices[hull.equations[:, 3] < 0]
-
-
-def test_tetrahedra_are_those_of_qhull_but_for_slivers_at_the_hull(monkeypatch):
-    for spread in (0.0, 0.4):
-        rng = np.random.default_rng(8)
-        points = 10.0 * rng.random((800, 3))
-        square = (spread * (1.0 + rng.uniform(-1, 1, 800))) ** 2
-        made, neighbour = triangulate(points, square)
-        expected = rows_of(by_qhull(points, square))
-        assert rows_of(made) <= expected
-        assert len(rows_of(made)) == len(made) > 0.99 * len(expected)
-        for a, c in zip(*np.nonzero(neighbour >= 0), strict=True):
-            assert set(made[a]) - {made[a, c]} <= set(made[neighbour[a, c]])
-        assert np.sum(neighbour < 0) < 0.1 * len(made)
-    with monkeypatch.context() as small:  # room grows where it is too small
-        small.setattr(triangulation, "HOLE", 8)
-        small.setattr(triangulation, "TETRAHEDRA_A_POINT", 1)
-        assert rows_of(triangulate(points, square)[0]) == rows_of(made)
-    lattice = np.indices((3, 3, 3)).reshape(3, -1).T.astype(float)
-    assert triangulate(lattice, np.zeros(27)) is None, "degenerate points have no tessellation"
-    twice = np.concatenate([points[:20]] * 2)
-    assert triangulate(twice, np.zeros(40)) is None
-
-
 # ------------------------------------------------------------------------------------------------
 # Nodes: power centres, or the points of their tetrahedra that are nearest to them.
 
@@ -422,15 +275,10 @@ def test_a_node_is_the_point_of_its_tetrahedron_nearest_to_the_power_centre():
         assert np.linalg.norm(node[p] - centre[p]) <= np.linalg.norm(best - centre[p]) + 1e-9
         assert inside(corner[p], node[p])
     assert all(inside(corner[p], centre[p]) for p in np.flatnonzero(~moved)[:60])
-    # heights are those of the nodes above the facets
-    height, corner = nodes.heights, network.throat_corner
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    shift = np.stack([0 * network.throat_shift, network.throat_shift], axis=1)
-    place = node[network.throat_pores] + shift * np.ptp(network.box, axis=1)
-    apart = np.einsum("tsk,tk->ts", place - corner[:, :1], normal)
-    assert height == pytest.approx(np.abs(apart), abs=1e-9)
-    cubic = build_network(simple_cubic(), periodic=ALL)  # its cells keep their one centre
-    assert np.all(nodes_of(cubic).position == cubic.pore_power_centre)
-    still = ~moved[network.throat_pores]
-    assert np.all(height[still] == network.throat_heights[still])
+
+
+def test_degenerate_points_have_no_tessellation():
+    lattice = np.indices((3, 3, 3)).reshape(3, -1).T.astype(float)
+    twice = np.concatenate([10.0 * np.random.default_rng(8).random((20, 3))] * 2)
+    for points in (lattice, twice):
+        assert triangulate(points, np.zeros(len(points))) is None

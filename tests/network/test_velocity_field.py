@@ -8,7 +8,6 @@ import pytest
 
 import fdnet
 from fdnet.errors import CaseError, NetworkError
-from fdnet.network import stokes
 from fdnet.network.field.field import build_lattice, solved_field, streamlines
 from fdnet.network.stokes import solve_stokes
 from fdnet.spheres.snapshot import Snapshot
@@ -84,43 +83,6 @@ def test_forces_add_up_to_the_pressure_drop_times_the_area():
             assert max(clear) < 0.02 * max(gradient.values()), periodic
 
 
-def free_normals(gap):
-    """Centres and unit normals whose places on the sphere are `gap` away from all others."""
-    size = np.ptp(pack().box, axis=1)
-    out = np.random.default_rng(2).normal(size=(4000, 3))
-    out /= np.linalg.norm(out, axis=1)[:, None]
-    centre = pack().position[np.arange(4000) % 16]
-    apart = (centre + out)[:, None] - pack().position
-    apart -= size * np.round(apart / size)
-    second = np.sort(np.linalg.norm(apart, axis=2), axis=1)[:, 1]
-    return centre[second > 1.0 + gap], out[second > 1.0 + gap]
-
-
-def test_the_velocity_at_a_grain_is_linear_along_it_and_quadratic_across():
-    """What comes in across is what goes out along: else there were sinks at the walls."""
-    centre, out = free_normals(0.5)
-    assert len(out) > 100
-    near = [field("xyz").at(centre + (1.0 + d) * out) for d in (2e-3, 2e-2)]
-    across = [np.abs(np.sum(u * out, axis=1)).mean() for u in near]
-    along = [np.linalg.norm(u, axis=1).mean() for u in near]
-    assert along[1] == pytest.approx(10.0 * along[0], rel=0.1)
-    assert across[1] == pytest.approx(100.0 * across[0], rel=0.1)
-    assert across[1] < 0.05 * along[1]
-    place, step = centre + 1.02 * out, 1e-4 * np.eye(3)
-    ahead, behind = ([field("xyz").at(place + way * one) for one in step] for way in (1, -1))
-    gradient = (np.array(ahead) - np.array(behind)).transpose(1, 0, 2) / 2e-4
-    inward = np.abs(np.einsum("ni,nij,nj->n", out, gradient, out)).mean()
-    assert np.abs(np.trace(gradient, axis1=1, axis2=2)).mean() < 0.3 * inward
-
-
-def test_far_upstream_the_mud_moves_evenly():
-    current = field("yz")
-    far = points(50) - [40.0, 0.0, 0.0]
-    assert np.array_equal(current.at(far), np.tile([1.0, 0.0, 0.0], (50, 1)))
-    entry = points(4000) * [0.0, 1.0, 1.0] + [current.lattice.low[0] + 0.1, 0.0, 0.0]
-    assert current.at(entry).mean(axis=0)[0] == pytest.approx(1.0, abs=0.03)
-
-
 def test_periods_turns_and_units_change_nothing():
     """The iteration stops at 1 % of its forces, so single points may differ more than the mean."""
     current, u = field("xyz"), field("xyz").at(points())
@@ -141,7 +103,7 @@ def test_periods_turns_and_units_change_nothing():
     assert other.k == pytest.approx(1e-6 * field("yz").k, rel=2e-3)
 
 
-def test_a_finer_grid_is_closer_and_about_a_million_cells_where_none_is_asked_for():
+def test_a_finer_grid_is_closer():
     fine = field("xyz", 20.0).at(points())
     speed = np.linalg.norm(fine, axis=1)[np.any(fine, axis=1)].mean()
     errors = [
@@ -150,9 +112,6 @@ def test_a_finer_grid_is_closer_and_about_a_million_cells_where_none_is_asked_fo
     ]
     assert errors[1] < 0.16
     assert errors[1] < 0.6 * errors[0] < 0.2
-    small = fdnet.velocity_field(pack(), periodic="xyz").lattice.spacing
-    assert small == pytest.approx(2.0 / 18.0, rel=0.1)
-    assert small.max() <= 2.0 / 18.0
 
 
 def test_fines_turn_the_flow_and_those_off_the_grid_are_left_out_and_counted():
@@ -170,10 +129,6 @@ def test_fines_turn_the_flow_and_those_off_the_grid_are_left_out_and_counted():
     current = fdnet.velocity_field(pack(), periodic="yz", fines=both, cells=6.0, upstream=2.0)
     assert current.left_out == 1
     assert np.all(current.fine_force[0] == 0.0)
-    cake = Snapshot.from_arrays([[-9.0, 1.0, 1.0]], 0.2, box=pack().box, kind="fine")
-    wide = fdnet.velocity_field(pack(), periodic="yz", fines=cake, cells=6.0)
-    assert wide.left_out == 0
-    assert np.all(wide.at([[-9.0, 1.0, 1.0]]) == 0.0)
 
 
 def test_bad_points_packs_and_cells_are_refused():
@@ -216,43 +171,3 @@ def test_the_line_of_a_wave_is_the_integral_of_its_slope():
     for step, until in [(0.0, 1.0), (0.1, -1.0)]:
         with pytest.raises(CaseError, match="expected both to be positive"):
             streamlines(wave, np.zeros((1, 3)), step=step, until=until)
-
-
-def test_a_line_ends_where_the_fluid_stands_still_and_where_it_goes_in_circles():
-    wall, starts = (
-        Velocity(lambda x, y, z: (np.where(x < 1.0, 1.0, 0.0), 0.0, 0.0)),
-        np.zeros((2, 3)),
-    )
-    starts[1, 0] = 1.5
-    stopped, beyond = streamlines(wall, starts, step=0.3, until=2.0)
-    assert 1.0 - 0.3 / 16 < stopped[-1, 0] < 1.0
-    assert beyond == pytest.approx(starts[1:])
-    circle, start = Velocity(lambda x, y, z: (-y, x, 0.0)), np.array([[1.0, 0.0, 0.0]])
-    (line,) = streamlines(circle, start, step=0.01, until=2.0, longest=7.0)
-    assert np.linalg.norm(line, axis=1) == pytest.approx(1.0, abs=1e-3)
-    assert len(line) == 701
-
-
-def test_most_lines_find_their_way_through_a_lattice():
-    """Simple cubic: the straight channel of the middle is a streamline by symmetry."""
-    lattice = 1e-3 * (np.indices((2, 2, 2)).reshape(3, -1).T + 0.5)
-    spheres = fdnet.Snapshot.from_arrays(lattice, 0.5e-3)
-    flow = fdnet.velocity_field(spheres, periodic="yz", cells=8)
-    places = np.array([[-0.3e-3, 1e-3, 1e-3], [-0.3e-3, 0.85e-3, 1.1e-3]])
-    middle, beside = streamlines(flow, places, step=2e-5, until=2e-3)
-    assert middle[:, 1:] == pytest.approx(1e-3, abs=2e-5)
-    assert beside[-1, 0] >= 2e-3
-
-
-def test_fewer_iterations_give_the_same_flow(monkeypatch):
-    """What the preconditioner takes out of the slow forces is worth its cost."""
-    place = (np.indices((4, 3, 3)).reshape(3, -1).T + 0.5) * 1e-3
-    place += 0.1e-3 * np.random.default_rng(1).standard_normal(place.shape)
-    radius, fields = np.where(np.arange(36) % 3 == 0, 0.35e-3, 0.5e-3), []
-    grains = Snapshot.from_arrays(place, radius, box=[0, 4e-3, 0, 3e-3, 0, 3e-3])
-    for share in (0.0, stokes.TAKEN_OUT):
-        monkeypatch.setattr(stokes, "TAKEN_OUT", share)
-        fields.append(fdnet.velocity_field(grains, periodic="yz", cells=10.0, tolerance=0.01))
-    without, taken = fields
-    assert taken.solved.iterations < 0.7 * without.solved.iterations
-    assert taken.resistance == pytest.approx(without.resistance, rel=1e-4)

@@ -33,16 +33,8 @@ FILES = (*TABLES, "summary.json", "manifest.json", "case.toml", ".unfinished")
 AT_STAKE = (*FILES, "pack/*", "pack/post/*", "invade/*", "invade/post/*")
 """Files that are damaged: results, records, and what LIGGGHTS wrote."""
 UNREAD = (".lock", "screen.txt", "log.liggghts")
-FOREIGN = {
-    ".lock": "",
-    "summary.json": "{}",
-    "manifest.json": '{"name": "an extension", "version": 3}',
-    "report.html": "<p>mine</p>",
-    "case.toml": "mine = 1\n",
-    "pack/stage.json": "{}",
-    "pack/pack.data": "mine",
-    "figures/figure.png": "mine",
-}
+FOREIGN = (".lock", "summary.json", "manifest.json", "report.html", "case.toml")
+FOREIGN += ("pack/stage.json", "pack/pack.data", "figures/figure.png")
 """Names that fdnet uses too, in a folder of somebody else."""
 
 
@@ -60,27 +52,14 @@ def kill(rng: Random, place: Path, prepared: Prepared) -> str:
     return finish(prepared, out)
 
 
-def pause(rng: Random, place: Path, prepared: Prepared) -> str:
-    """A run is stopped for a moment and goes on."""
-    out = prepared.copy("unfinished", place)
-    child = prepared.start(out, "--resume")
-    for number in (signal.SIGSTOP, signal.SIGCONT) * rng.randrange(1, 4):
-        child.let_run(rng.uniform(0.0, 0.5 * prepared.seconds["unfinished"]))
-        child.send(number)
-    return judge(prepared, out, child.wait())
-
-
 def _target(rng: Random, out: Path) -> Path:
     """A file of the run that is not empty; each pattern of AT_STAKE has the same chance."""
-    groups = [
-        [
-            path
-            for path in sorted(out.glob(pattern))
-            if path.is_file() and path.stat().st_size and path.name not in UNREAD
-        ]
-        for pattern in AT_STAKE
-    ]
-    return rng.choice(rng.choice([group for group in groups if group]))
+
+    def whole(path: Path) -> bool:
+        return path.is_file() and path.stat().st_size > 0 and path.name not in UNREAD
+
+    groups = [[*filter(whole, sorted(out.glob(pattern)))] for pattern in AT_STAKE]
+    return rng.choice(rng.choice([*filter(None, groups)]))
 
 
 def damage(how: str, rng: Random, place: Path, prepared: Prepared) -> str:
@@ -142,10 +121,10 @@ def race(rng: Random, place: Path, prepared: Prepared) -> str:
 def foreign(rng: Random, place: Path, prepared: Prepared) -> str:
     """A folder of somebody else is refused, also with --resume and --force."""
     out = place / "run"
-    names = {NOTES, *rng.sample(sorted(FOREIGN), rng.randrange(4))}
+    names = {NOTES, *rng.sample(FOREIGN, rng.randrange(4))}
     for name in sorted(names):
         (out / name).parent.mkdir(parents=True, exist_ok=True)
-        (out / name).write_text(FOREIGN.get(name, "mine"))
+        (out / name).write_text(rng.choice(("", "{}", "mine")))
     before, options = contents(out), rng.choice(([], ["--resume"], ["--force"]))
     ended = prepared.call(out, *options)
     check_kept(out, before, everything=True)
@@ -187,7 +166,6 @@ ATTACKS: Mapping[str, Attack] = {
     "garble": partial(damage, "garble"),
     "file size": partial(limit, resource.RLIMIT_FSIZE, (0, 1000, 8_000, 30_000, 100_000)),
     "race": race,
-    "pause": pause,
     **{how: partial(damage, how) for how in ("cut", "zero", "remove", "swap")},
     # with 4 handles Python does not start; below 200 MB the import of numpy ends the process
     "handles": partial(limit, resource.RLIMIT_NOFILE, (5, 6, 8, 12, 16, 24, 48)),

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import math
 import multiprocessing
 import os
 import resource
@@ -24,7 +23,7 @@ MOST_BYTES = 200 << 20
 STAGES = ("--stages", "pack,invade,analyse")
 TABLES = tuple(f"{name}.csv" for name in ("spheres_initial", "spheres_damaged", "sections"))
 TABLES += ("profile.csv", "pores.csv", "throats.csv")
-NOT_COMPARED = {"seconds", "warnings", "left_out", "cpu_seconds", "memory_bytes"}
+NOT_COMPARED = {"seconds", "warnings", "left_out", "cpu_seconds", "peak_memory_bytes"}
 """Keys of summary.json that may differ: what took how long, and what is said about it."""
 NOTES = "notes.txt"
 """A file of the user that lies in every attacked folder."""
@@ -91,7 +90,9 @@ def _command(words: list[str], error: str, limits: Mapping[int, int]) -> None:
     sys.exit(main(words))
 
 
-def start(words: list[str], error: Path, limits: Mapping[int, int], *, fresh: bool) -> Child:
+def start(
+    words: list[str], error: Path, *, fresh: bool = False, limits: Mapping[int, int] | None = None
+) -> Child:
     """`fdnet WORD ...` with limits of the system (RLIMIT_...: value).
 
     It is forked from a process that has loaded fdnet; `fresh` is a Python of its own.
@@ -103,7 +104,7 @@ def start(words: list[str], error: Path, limits: Mapping[int, int], *, fresh: bo
             stdout=subprocess.DEVNULL,
             stderr=error.open("wb"),
             start_new_session=True,
-            preexec_fn=lambda: _limit(limits),
+            preexec_fn=lambda: _limit(limits or {}),
         )
         return Child(own.pid, own.poll, error)
     folders = [str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
@@ -111,27 +112,21 @@ def start(words: list[str], error: Path, limits: Mapping[int, int], *, fresh: bo
     server = multiprocessing.get_context("forkserver")
     server.set_forkserver_preload(["robustness.warm"])
     error.touch()
-    process = server.Process(target=_command, args=(words, str(error), dict(limits)))
+    process = server.Process(target=_command, args=(words, str(error), dict(limits or {})))
     process.start()
     assert process.pid is not None
     return Child(process.pid, lambda: process.exitcode, error)
 
 
 class Prepared(NamedTuple):
-    """What the attacks start from.
-
-    Attributes:
-        root: folder of the runs "finished", "packed" (nothing but the pack is made) and
-            "unfinished" (killed in the invasion).
-        seconds: wall time that a command takes on each of them, and on none.
-        summary: that of the uncut run without NOT_COMPARED.
-        tables: SHA-256 of each of TABLES of the uncut run.
-    """
+    """What the attacks start from: runs that are finished, packed alone, and unfinished."""
 
     root: Path
     seconds: dict[str, float]
+    """Wall time that a command takes on each of them, and on none."""
     summary: dict[str, Any]
     tables: dict[str, str]
+    """Summary of the uncut run, and the SHA-256 of each of its TABLES."""
 
     def copy(self, which: str, place: Path) -> Path:
         """A copy of one of the runs with the user's notes in it; an empty place for none."""
@@ -141,18 +136,11 @@ class Prepared(NamedTuple):
             (out / NOTES).write_text("mine")
         return out
 
-    def start(
-        self,
-        out: Path,
-        *options: str,
-        fresh: bool = False,
-        limits: Mapping[int, int] | None = None,
-    ) -> Child:
+    def start(self, out: Path, *options: str, **more: Any) -> Child:
         """Start the command that runs the case in `out`."""
         words = ["run", str(self.root / "case.toml"), "--out", str(out), "--quiet", *options]
         words += STAGES * ("--stages" not in words)
-        error = self.root / f"error-{time.monotonic_ns()}"
-        return start(words, error, limits or {}, fresh=fresh)
+        return start(words, self.root / f"error-{time.monotonic_ns()}", **more)
 
     def call(self, out: Path, *options: str, **more: Any) -> Ended:
         """The command from its start to its end."""
@@ -167,15 +155,10 @@ def to_go_on(out: Path) -> list[str]:
 def prepare(root: Path) -> Prepared:
     """Run the case to its end, up to the pack, and until it is killed in the invasion."""
     (root / "case.toml").write_text(TOML)
-    runs = Prepared(root, {}, {}, {})
-
-    def timed(which: str, out: Path, *options: str) -> None:
-        begin, ended = time.monotonic(), runs.call(out, *options)
-        assert ended.code == 0, f"the run to be attacked fails: {ended.error}"
-        runs.seconds[which] = time.monotonic() - begin
-
-    timed("", root / "finished")
-    timed("pack alone", root / "packed", "--stages", "pack")
+    runs, begin = Prepared(root, {}, {}, {}), time.monotonic()
+    assert runs.call(root / "finished").code == 0, "the run to be attacked fails"
+    runs.seconds.update(dict.fromkeys(("", "packed", "unfinished"), time.monotonic() - begin))
+    runs.call(root / "packed", "--stages", "pack")
     shutil.copytree(root / "packed", root / "unfinished")
     history = root / "unfinished" / "invade" / "history.csv"
     child = runs.start(root / "unfinished")
@@ -183,7 +166,6 @@ def prepare(root: Path) -> Prepared:
     child.send(signal.SIGKILL)
     child.wait()
     assert not (root / "unfinished" / "invade" / "stage.json").exists(), "it came to its end"
-    runs.seconds.update(packed=runs.seconds[""], unfinished=runs.seconds[""])
     runs.summary.update(results(root / "finished"))
     runs.tables.update({name: digest(root / "finished" / name) for name in TABLES})
     return runs
@@ -191,11 +173,11 @@ def prepare(root: Path) -> Prepared:
 
 def results(out: Path) -> dict[str, Any]:
     """What summary.json says, without what may differ. Raises OSError or ValueError."""
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    nothing = {"parse_constant": lambda name: None}
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"), **nothing)
     if not isinstance(summary, dict):
         raise ValueError("not a mapping")
-    plain = {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in summary.items()}
-    return {key: value for key, value in plain.items() if key not in NOT_COMPARED}
+    return {key: value for key, value in summary.items() if key not in NOT_COMPARED}
 
 
 def digest(path: Path) -> str:
@@ -233,15 +215,13 @@ def judge(prepared: Prepared, out: Path, ended: Ended, *, stopped: bool = False)
 
 def differs(prepared: Prepared, out: Path) -> str:
     """What differs from the uncut run in a finished folder, in words; "" when nothing does."""
-    for name in TABLES:
-        if not (out / name).exists():
-            return f"{name} is missing"
-        if digest(out / name) != prepared.tables[name]:
-            return f"{name} differs"
     try:
+        for name in TABLES:
+            if digest(out / name) != prepared.tables[name]:
+                return f"{name} differs"
         summary = results(out)
     except (OSError, ValueError) as error:
-        return f"summary.json cannot be read: {error}"
+        return f"a result cannot be read: {error}"
     keys = [key for key in prepared.summary if summary.get(key) != prepared.summary[key]]
     return f"summary.json: {', '.join(keys)}" if keys else ""
 

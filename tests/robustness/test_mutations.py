@@ -124,13 +124,11 @@ DUMPS = tuple(mutations.small_dump(Random(frames), frames) for frames in (1, 2, 
 PACKS = tuple(mutations.small_pack(Random(number), number % 2 * 12) for number in range(4))
 KINDS = {
     "case bytes": (judge_case, CASES, mutations.change_bytes),
-    "case structure": (judge_case, CASES, mutations.change_structure),
-    "case values": (judge_case, CASES, mutations.change_values),
+    "case tables": (judge_case, CASES, mutations.change_tables),
     "dump bytes": (judge_dump, DUMPS, mutations.change_bytes),
-    "dump rows": (judge_dump, DUMPS, mutations.change_dump_rows),
-    "dump headers": (judge_dump, DUMPS, mutations.change_dump_headers),
+    "dump lines": (judge_dump, DUMPS, mutations.change_lines),
     "spheres bytes": (judge_spheres, PACKS, mutations.change_bytes),
-    "spheres rows": (judge_spheres, PACKS, mutations.change_sphere_rows),
+    "spheres lines": (judge_spheres, PACKS, mutations.change_lines),
     "spheres geometry": (judge_spheres, PACKS, mutations.change_geometry),
 }
 
@@ -141,8 +139,7 @@ def outcomes(kind: str, number: int, folder: Path) -> Counter[str]:
     seen: Counter[str] = Counter()
     for index in range(number):
         rng = Random(f"{SEED}:{kind}:{index}")
-        data, place = change(rng, rng.choice(seeds)), folder / f"{index}"
-        place.mkdir()
+        data, place = change(rng, rng.choice(seeds)), folder / f"{kind} {index}"
         seen[outcome(judge, data, place, rng, f"{kind} {index} of seed {SEED}")] += 1
     return seen
 
@@ -155,6 +152,7 @@ def outcome(
     def stop(*_: object) -> None:
         raise TooLong(f"not done within {limit:g} s")
 
+    place.mkdir(exist_ok=True)
     before = signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, limit)
     try:
@@ -175,11 +173,9 @@ def test_good_inputs_and_some_mutated_ones_make_no_fault(tmp_path):
     plain.choice = lambda options: options[-1]
     for kind, (judge, seeds, _) in KINDS.items():
         for number, data in enumerate(seeds[-2:] * (" bytes" in kind)):
-            (tmp_path / f"{kind} {number}").mkdir()
-            good = outcome(judge, data, tmp_path / f"{kind} {number}", plain, kind, limit=120.0)
+            good = outcome(judge, data, tmp_path / f"{kind} good {number}", plain, kind, 120.0)
             assert good == "accepted"
-        (tmp_path / kind).mkdir()
-        assert sum(outcomes(kind, 8, tmp_path / kind).values()) == 8
+        assert outcomes(kind, 8, tmp_path).total() == 8
 
 
 @pytest.mark.nightly
@@ -194,7 +190,7 @@ def test_mutated_inputs_make_no_fault(kind, tmp_path, record_property):
 
 
 def test_a_fault_is_known_when_it_is_met(tmp_path):
-    """Deliberate breaks: a traceback, a hang, a warning, a file that stays, a wrong number."""
+    """Deliberate breaks: a traceback, a hang, a warning, a file that stays."""
 
     def left(_: bytes, folder: Path, rng: Random) -> str:
         (folder / "in.pack").write_text("half")
@@ -212,9 +208,3 @@ def test_a_fault_is_known_when_it_is_met(tmp_path):
     ):
         with pytest.raises(AssertionError, match=words):
             outcome(judge, b"", tmp_path, Random(1), "one", limit=0.3)
-    good = {"k_initial_m2": 1, "k_damaged_m2": 0.5, "porosity_initial": 0.4}
-    good |= {"porosity_damaged": 0.3, "sections": []}
-    assert judge_numbers(json.dumps(good)) == "accepted"
-    for name, value in (("k_damaged_m2", 1.5), ("porosity_initial", 1.1), ("k_initial_m2", -1)):
-        with pytest.raises(AssertionError):
-            judge_numbers(json.dumps(good | {name: value}))

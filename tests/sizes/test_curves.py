@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from builders import tiny
-from scipy.integrate import quad
 from scipy.special import gamma, gammaincinv, ndtr
 
 from fdnet.errors import CaseError
@@ -16,7 +15,6 @@ from fdnet.scales.pack import (
     refuse_unreachable,
     within_limit,
 )
-from fdnet.scales.scales import scales_of
 from fdnet.sizes import (
     NUMBER,
     SURFACE,
@@ -27,7 +25,6 @@ from fdnet.sizes import (
     SizeCurve,
     Uniform,
     best_fit,
-    blended,
     cut_curve,
     dealt,
     volume_quantiles,
@@ -86,16 +83,6 @@ def test_moments_of_rosin_and_rammler_are_gamma_functions():
         if exponent > 3:
             sauter = 4e-4 / gamma(1 - 1 / exponent)
             assert whole.mean(3) / whole.mean(2) == pytest.approx(sauter, rel=1e-8)
-    # between cuts also where the gamma functions of the whole do not exist (p <= -n)
-    curve = cut_curve(RosinRammler(4e-4, 1.5), cut=(0.01, 0.99))
-    for power in (-3, -2, 0.5, 2):
-
-        def density(d: float, power: float = power) -> float:
-            u = (d / 4e-4) ** 1.5
-            return d**power * 1.5 / d * u * math.exp(-u)
-
-        exact = quad(density, curve.low, curve.high, epsrel=1e-12, limit=500)[0]
-        assert curve.total(power) == pytest.approx(exact, rel=1e-10), power
     # by number to volume: F = P(1 + 3/n, u), the regularised incomplete gamma function
     curve = cut_curve(RosinRammler(4e-4, 2.0), by=NUMBER, cut=(0.05, 0.9))
     ends = [4e-4 * gammaincinv(2.5, share) ** 0.5 for share in (0.05, 0.9)]
@@ -144,21 +131,6 @@ def test_strata_and_batches_have_the_curve_of_the_whole():
         assert np.abs(np.array(finer) - count * np.array(shares)).max() <= 1.5
 
 
-def test_a_blend_sums_its_parts_by_volume():
-    """Mean volume by number: 1 / sum(w / <v>), and shares finer add up by their volumes."""
-    first = cut_curve(LogNormal(40e-6, 0.3), cut=(0.01, 0.99))
-    second = cut_curve(LogNormal(80e-6, 0.5), cut=(0.02, 0.95))
-    both = blended((0.7, 0.3), (first, second))
-    kept = np.array([0.7 * first.kept, 0.3 * second.kept])
-    weight, size = kept / kept.sum(), np.array([60e-6])
-    mean = 1 / (weight[0] / first.mean(3) + weight[1] / second.mean(3))
-    assert both.mean(3) == pytest.approx(mean, rel=1e-9)
-    exact = weight @ np.array([first.share_finer(size)[0], second.share_finer(size)[0]])
-    assert float(both.share_finer(size)[0]) == pytest.approx(exact, rel=1e-5)
-    assert both.below == pytest.approx(0.7 * 0.01 + 0.3 * 0.02)
-    assert both.kept == pytest.approx(kept.sum())
-
-
 def test_three_points_of_a_law_are_met_and_others_by_the_line_of_least_squares():
     """The log-normal quantiles are symmetric, so the line passes through the mean of ln d."""
     for law in (LogNormal(0.4e-3, 0.34), RosinRammler(0.46e-3, 3.5)):
@@ -205,10 +177,3 @@ def test_a_porosity_out_of_reach_is_refused_with_what_can_be():
     made = 1 - (1 - 0.36) * 1.04**3
     assert within_limit(0.36, made, 0.08, 0.04) == pytest.approx(1 - (1 - 0.36) * 1.02**3)
     assert within_limit(0.36, made, 0.08, 0.0) == pytest.approx(0.36)
-    # log-normal sand with a spread of 0.34 by volume gets to about 0.32
-    curve = 'sizes={D10="0.25 mm", D50="0.40 mm", D90="0.60 mm"}'
-    box, fines = "box.size_mm=[3.0, 2.4, 2.4]", "fines.radius_mm=0.02"
-    for porosity, dense in ((0.30, True), (0.38, False)):
-        said = scales_of(tiny(box, fines, f"grains={{{curve}, porosity={porosity}}}")).warnings
-        assert any("0.3 grains overlap" in one for one in said) == dense
-        assert any("at random" in one for one in said) <= dense

@@ -3,22 +3,12 @@
 import numpy as np
 import pytest
 
-from fdnet.errors import CaseError
-from fdnet.network.flow.sections import pooled
-from fdnet.spheres.geometry import Porosity, groups_apart, measure_porosity, touching_pairs
+from fdnet.spheres.geometry import groups_apart, measure_porosity, touching_pairs
 from fdnet.spheres.snapshot import resting
-from tests.network.packs import face_centred, random_pack, simple_cubic, snapshot
+from tests.network.packs import random_pack, snapshot
 
 BOX = np.array([[0.0, 2.0]] * 3)
 ALL, NONE = (True,) * 3, (False,) * 3
-
-
-def test_lattices_have_their_known_porosity():
-    for pack, expected in [(simple_cubic(), 1 - np.pi / 6), (face_centred(), 0.259520)]:
-        porosity = measure_porosity(pack, periodic=ALL)
-        assert porosity.mean == pytest.approx(expected, abs=2e-4)
-        assert abs(porosity.mean - expected) < 6 * porosity.standard_error + 1e-6
-        assert porosity.sum == pytest.approx(expected, abs=1e-6)
 
 
 def test_overlap_counts_once():
@@ -57,27 +47,6 @@ def test_bins_of_one_sphere_are_its_spherical_segments_and_average_to_the_mean()
     pack = random_pack(40)
     porosity = measure_porosity(pack, periodic=ALL, edges=np.linspace(0, pack.box[0, 1], 8))
     assert porosity.profile.mean() == pytest.approx(porosity.mean, abs=1e-12)
-
-
-def test_an_empty_box_is_all_void_and_wrong_edges_are_refused():
-    empty = snapshot(np.zeros((0, 3)), 1.0, BOX)
-    assert measure_porosity(empty, periodic=NONE).mean == 1.0
-    with pytest.raises(CaseError, match="ascend"):
-        measure_porosity(empty, periodic=NONE, edges=np.array([0.0, 3.0]))
-
-
-def test_pooling_averages_between_edges_that_leave_out_both_ends():
-    """Cuts 0, 1, 3, 4, 6 with 0.1, 0.4, 0.7, 0.2: between 1 and 4 (0.4 x 2 + 0.7 x 1) / 3."""
-    fine = Porosity(
-        mean=0.0,
-        standard_error=0.0,
-        edges=np.array([0.0, 1.0, 3.0, 4.0, 6.0]),
-        profile=np.array([0.1, 0.4, 0.7, 0.2]),
-        sum=0.0,
-    )
-    assert pooled(fine, np.array([1.0, 3.0, 4.0])) == pytest.approx([0.4, 0.7])
-    assert pooled(fine, np.array([1.0, 4.0])) == pytest.approx([0.5])
-    assert pooled(fine, np.array([0.0, 3.0, 6.0])) == pytest.approx([0.3, 1.1 / 3])
 
 
 def test_no_two_of_a_group_touch_and_groups_are_few():

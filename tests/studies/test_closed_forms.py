@@ -1,6 +1,5 @@
 """Points of the studies that have an exact answer: orders, bounds, 80 digits, known packs."""
 
-import csv
 import math
 from pathlib import Path
 
@@ -8,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from fdnet.errors import CaseError, FlowError
+from fdnet.errors import CaseError
 from fdnet.scales.contacts import sphere_mass
 from fdnet.scales.scales import scales_of
 from tests.network.exact import exact_balance, random_links
-from validation import laws, linear_solver, study, velocity_field
-from validation.linear_solver import Circuit, circuit_of, exact_fluxes, solve_by
+from validation import study
+from validation.linear_solver import Circuit, exact_fluxes
 from validation.small_systems import (
     SPEED,
     deepest_overlap_of,
@@ -48,17 +47,6 @@ def test_overlap_falls_as_the_root_of_the_stiffness_up_to_the_nominal_value(tmp_
         exact = deepest_overlap_of(fines.damping_ratio, SPEED, pair.normal_stiffness, mass / 2)
         assert one["overlap_over_diameter"] * 2 * radius == pytest.approx(exact, rel=0.025)
         assert one["restitution_error"] == pytest.approx(-0.0085, abs=5e-4)
-
-
-@pytest.mark.nightly
-@pytest.mark.liggghts
-def test_collisions_packs_and_drag_converge_in_their_orders(tmp_path):
-    worst = measured(tmp_path, (0.4, 0.2, 0.1, 0.05), system="four collisions")
-    assert order_of(worst, "restitution_error", by="value") == pytest.approx(1.1, abs=0.3)
-    assert worst[0.1]["restitution_error"] < 0.03
-    pack = measured(tmp_path, (0.4, 0.2, 0.1, 0.05), system="undamped pack")
-    assert order_of(pack, "energy_drift") == pytest.approx(2.0, abs=0.3)
-    assert pack[0.1]["energy_drift"] < 1e-4
 
 
 @pytest.mark.nightly
@@ -110,66 +98,3 @@ def test_eighty_digits_are_the_rational_answer():
         exact = exact_balance(ends, conductance, jump, pores + 1)[1]
         fluxes = exact_fluxes(Circuit(ends=node, conductance=conductance, count=pores))
         assert fluxes == pytest.approx(exact, rel=1e-14, abs=1e-30 * np.abs(exact).max())
-
-
-@pytest.mark.nightly
-def test_solvers_are_as_near_to_eighty_digits_as_their_tolerance_and_rounding(tmp_path):
-    for decades, bound in ((0, 1e-10), (8, 1e-9), (16, 1e-6)):
-        network = {"measure": linear_solver.measure, "pores": 200, "decades": decades, "seed": 0}
-        for method in ("fdnet", "METIS + splu", "spsolve"):
-            one = measured(tmp_path, ("own",), method=method, **network)["own"]
-            assert one["worst throat"] < (1e-9 if method == "fdnet" else bound)
-            assert abs(one["inflow error"]) < (1e-9 if method == "fdnet" else bound)
-        for method in linear_solver.MOST_STEPS:
-            result = measured(tmp_path, (1e-4, 1e-8, 1e-12), method=method, **network)
-            worst = [one["worst throat"] for one in result.values()]
-            assert worst[0] > 100 * worst[1] > 1e4 * worst[2] > 0
-            for one in result.values():  # both over the inflow of the solve
-                off = one["inflow error"]
-                assert abs(off) / (1 + off) <= one["residual"]
-
-
-def test_a_chain_carries_its_series_conductance_and_steps_may_run_out(tmp_path, monkeypatch):
-    """Five equal links in a row with a side arm: g / 5 through each, nothing in the arm."""
-    ends = np.array([(5, 0), (0, 1), (1, 2), (2, 3), (3, 6), (4, 1)])
-    chain = Circuit(ends=ends, conductance=np.full(6, 3.0), count=5)
-    for method in linear_solver.METHODS:
-        flux, steps = solve_by(method, chain, 1e-12)
-        assert flux == pytest.approx([0.6] * 5 + [0.0], abs=1e-10)
-        assert math.isnan(steps) == (method not in linear_solver.MOST_STEPS)
-    monkeypatch.setitem(linear_solver.MOST_STEPS, "CG + Jacobi", 5)
-    with pytest.raises(FlowError, match="residual not below 1e-12 of the source in 5 steps"):
-        solve_by("CG + Jacobi", circuit_of(200, 8.0, 0, tmp_path), 1e-12)
-
-
-@pytest.mark.nightly
-def test_errors_of_the_velocity_fall_with_the_cells_and_points_lie_in_the_pores(tmp_path):
-    pack = {"measure": velocity_field.measure, "pack": "C, porosity 0.40", "fine": 12.0}
-    result = measured(tmp_path, (5.0, 7.0), **pack)
-    for name in ("velocity", "throat fluxes"):
-        assert 0.0 < result[7.0][name] < 0.7 * result[5.0][name]
-    lattice = laws.known_case("SC c = 0.216").pack
-    place = velocity_field.pore_points(lattice, 4000, 1)
-    assert len(place) / 4000 == pytest.approx(1.0 - 0.216, abs=0.02)  # 3 sigma
-
-
-@pytest.mark.nightly
-def test_laws_have_the_errors_of_the_table_of_accuracy_and_resolved_flow_converges(root, tmp_path):
-    with (root / "docs/validation/accuracy_packs.csv").open(newline="") as file:
-        known = {row["case"]: row for row in csv.DictReader(file)}
-    for pack, values in (
-        ("H_40_eps40", ("thesis", "effective", "lubrication")),
-        ("H_r5_d13", ("thesis + thesis", "lubrication + all-spheres")),
-    ):
-        name = "k/k0" if "+" in values[0] else "k"
-        law = measured(tmp_path, ("truth", *values), laws.measure, knob="law", seed=pack)
-        for value in values:
-            column = value if "+" in value else f"{value}: k0"
-            over = law[value][name] / law["truth"][name]
-            assert over == pytest.approx(float(known[pack][column]), abs=2e-4), (pack, value)
-    truth = laws.known_case("H_40_eps40").k
-    grids = measured(tmp_path, (16.0, 24.0), laws.measure, knob="cells", seed="H_40_eps40")
-    two = laws.measure(study.Point("s", "cells", 24.0, "H_40_eps40", {"coarser": 2 / 3}), tmp_path)
-    one = {cells: grid["k"] / truth - 1 for cells, grid in grids.items()}
-    assert one[16.0] > 1.5 * one[24.0] > 0
-    assert abs(two["k"] / truth - 1) < 0.5 * one[24.0]

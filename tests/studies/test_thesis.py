@@ -6,7 +6,7 @@ at 0.6, 1.1 and 1.6 mm; the faces of the specimen cut the layers at the ends.
 """
 
 from dataclasses import replace
-from math import log10, pi, sqrt
+from math import pi, sqrt
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,7 @@ from fdnet.errors import CaseError
 from fdnet.spheres.snapshot import Kind
 from validation.thesis import command
 from validation.thesis import quantities as q
-from validation.thesis.compare import half_width, mean_of, responses, rows_of
+from validation.thesis.compare import half_width, mean_of, rows_of
 from validation.thesis.figures import Sources, draw_all
 from validation.thesis.runs import Planned, State, find_state, planned, read_state, write_state
 
@@ -132,16 +132,6 @@ def test_fines_in_throats_and_bodies(run):
     assert measured == pytest.approx(expected)
 
 
-def test_deposition_by_throat_porosity(run):
-    rows = {(row["low"], row["high"]): row for row in q.deposition(run)}
-    clogged, open_ = rows[0.0, 0.4], rows[0.6, 1.0]
-    names = ("throats", "fines", "nearer_axis", "law", "decided", "nearer", "thesis")
-    assert [clogged[one] for one in names] == [2, 6, 1.0, "clogging", True, "axis", 0.5]
-    shares = [open_[one] for one in ("nearer_axis", "nearer_wall", "beyond_wall")]
-    assert shares == pytest.approx([1 / 3, 1 / 3, 1 / 3])
-    assert (open_["law"], open_["decided"]) == ("deposition", False)  # 4 of 6 prove nothing
-
-
 def test_intervals_of_the_textbooks():
     """Wilson's of 8 in 10; Student's t is 4.3027 for 2 degrees of freedom, 2.7764 for 4."""
     assert q.wilson_interval(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
@@ -149,17 +139,6 @@ def test_intervals_of_the_textbooks():
     assert half_width(one) == pytest.approx(4.3027 / sqrt(3), rel=1e-4)
     assert half_width(one, other) == pytest.approx(2.7764 * sqrt(2 / 3), rel=1e-4)
     assert mean_of([10.0], [1.0, 2.0, 3.0], grows=True).variance == pytest.approx(25.0)  # widened
-
-
-def test_drag_response_keeps_to_each_pack(results):
-    """Depths of the seeds are 1, 2 and 3 mm apart, slopes 0.49, 0.50 and 0.51 a decade."""
-    base, rows = results.iloc[0].to_dict(), []
-    for seed, x in ((seed, x) for seed in (1, 2, 3) for x in (0.1, 1, 10)):
-        depth = seed + (0.48 + 0.01 * seed) * log10(x)
-        name = f"quick-specimen5 drag.multiplier={x}" if x != 1 else "quick-specimen5"
-        rows.append(base | {"id": name, "seed": seed, "mean_depth_mm": depth})
-    of = ("quick-specimen5", "mean depth per decade of drag")
-    assert responses(pd.DataFrame(rows), *of) == pytest.approx([0.49, 0.50, 0.51])
 
 
 @pytest.mark.nightly
