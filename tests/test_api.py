@@ -127,7 +127,6 @@ def workplace(tmp_path_factory, root):
 
 
 @pytest.mark.liggghts
-@pytest.mark.nightly
 def test_examples_run(workplace, monkeypatch):
     monkeypatch.chdir(workplace)
     monkeypatch.setenv("MPLBACKEND", "Agg")
