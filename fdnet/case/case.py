@@ -154,11 +154,11 @@ class Case(Part):
     def digest(self, stage: str = "analyse") -> str:
         """Hash of what `stage` depends on.
 
-        "pack" ignores fluid, run and analysis, and of the fines all but what decides the ratio
-        of stiffnesses; "invade" ignores the analysis and the clean-up,
-        "clean_up" the analysis, but for side walls that let a fluid slip which is made with them
-        (`walls_of_the_fluid`). No result depends on `POLICIES` or on the bonds, which mechanics
-        alone reads, so no digest does.
+        "pack" ignores fluid, run and analysis, and of the fines all but what decides the ratio of
+        stiffnesses. "invade" ignores the analysis and the clean-up, "clean_up" the analysis, but
+        for side walls that let a fluid slip which is made with them (`walls_of_the_fluid`). No
+        result depends on `POLICIES` or on the bonds, which mechanics alone reads, so no digest
+        does. One stiffness for packing and invasion counts once.
         """
         data = self.data()
         data.pop("given", None)

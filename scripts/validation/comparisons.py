@@ -7,7 +7,6 @@ where it was stopped; `--rows FILE.csv` judges rows that are there and runs noth
 import argparse
 import csv
 import math
-import os
 import shutil
 import sys
 import tomllib
@@ -28,6 +27,7 @@ from fdnet.errors import CaseError, FdnetError
 from fdnet.files import path_option, refuse_folder_name, replacing, write_text
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
+from validation.study import processors
 
 TEMPLATES = Path(__file__).parent / "templates"
 COLUMNS = ("comparison", "value", "seed", "quantity", "observed", "core_s", "status")
@@ -178,13 +178,13 @@ def measure(comparisons: Sequence[Comparison], path: Path, *, quick: bool) -> No
                     continue
                 folder = path.parent / "work" / f"{one.name} {value} {seed}".replace(" ", "-")
                 shutil.rmtree(folder, ignore_errors=True)
-                before, status, seen = _core_seconds(), DONE, {"": float("nan")}
+                before, status, seen = processors(), DONE, {"": float("nan")}
                 try:
                     seen = dict(one.measure(Trial(value, seed, folder, quick)))
                 except FdnetError as error:
                     status = " ".join(str(error).split())
                     failed.append(f"{one.name} {value} {seed}: {status}")
-                core = round(_core_seconds() - before, 3)
+                core = round(processors() - before, 3)
                 with path.open("a", newline="", encoding="utf-8") as file:
                     writer = csv.writer(file)
                     writer.writerows([COLUMNS] if file.tell() == 0 else [])
@@ -197,10 +197,6 @@ def measure(comparisons: Sequence[Comparison], path: Path, *, quick: bool) -> No
         raise CaseError(
             f"{path}: {len(failed)} points failed, the first: {failed[0]}; run the command again"
         )
-
-
-def _core_seconds() -> float:
-    return sum(os.times()[:4])
 
 
 def findings(comparisons: Sequence[Comparison], rows: pd.DataFrame) -> list[Finding]:

@@ -175,7 +175,7 @@ def _attempt(study: Study, point: Point, work: Path) -> dict[str, Any]:
 
 def measure_point(study: Study, point: Point, work: Path) -> dict[str, Any]:
     """What a point found, its costs and its status; costs that it finds itself count."""
-    before = _processors()
+    before = processors()
     try:
         numbers, status = dict(study.measure(point, work)), judge.DONE
     except FdnetError as error:
@@ -184,7 +184,7 @@ def measure_point(study: Study, point: Point, work: Path) -> dict[str, Any]:
     except MemoryError:
         numbers, status = {}, "over memory"
     costs = {
-        "core_s": _processors() - before,
+        "core_s": processors() - before,
         "rss_mb": peak_resident_bytes() / 1e6,
         "steps": None,
     }
@@ -206,7 +206,8 @@ def least_time(work: Callable[[], Result], *, times: int = 3) -> tuple[Result, f
             return result, min(took)
 
 
-def _processors() -> float:
+def processors() -> float:
+    """CPU seconds of this process and of the children that it has waited for."""
     usages = map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)
 
