@@ -49,7 +49,6 @@ from fdnet.dem.invade_deck import (
     DrivingFluid,
     Moment,
     fine_density,
-    largest_share,
     read_state,
     render_invade,
     write_batch,
@@ -62,7 +61,6 @@ from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
 from fdnet.dem.supply import batches_of, densities, later_batch
 from fdnet.errors import CaseError, Doubt, LiggghtsError
 from fdnet.files import disk_is_full, write_text
-from fdnet.scales.clock import DRAG_LIMIT
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Snapshot
@@ -126,9 +124,8 @@ class ChunkedStage(ABC):
         if self.case.drag.coupled != (self.fluid is not None):
             needs, some = ("needs", "a") if self.case.drag.coupled else ("takes", "no")
             raise CaseError(
-                f"drag.crowd: {self.case.drag.crowd!r} with drag.field {self.case.drag.field!r} "
-                f"{needs} {some} fluid that fdnet computes; run the case with fdnet run or "
-                "fdnet.run_case"
+                f"drag.field: {self.case.drag.field!r} {needs} {some} fluid that fdnet computes; "
+                "run the case with fdnet run or fdnet.run_case"
             )
         (self.folder / "post").mkdir(parents=True, exist_ok=True)
         self.points.refuse_another_way(self.launch.ranks)
@@ -198,8 +195,7 @@ class ChunkedStage(ABC):
     def _play(self, name: str, last: Any | None, feed: Feed) -> None:
         """Feed LIGGGHTS a coupled stage, from the deck `name`.
 
-        Raises LiggghtsError when explicit drag would overshoot, DumpError when LIGGGHTS did not
-        show its spheres, and what the fluid raises.
+        Raises DumpError when LIGGGHTS did not show its spheres, and what the fluid raises.
         """
         assert self.fluid is not None
         updates = Updates(self.folder, self.fluid.measured, upto=last.step if last else 0)
@@ -210,8 +206,6 @@ class ChunkedStage(ABC):
             end, fresh = step + self.scales.checkpoint_steps, True
             while step < end:
                 steps = min(self._update(feed, updates, step, end, fresh), end - step)
-                if fresh and self.case.drag.scheme == "held" and self.scales.hold_steps > 1:
-                    feed("include held.in")
                 feed(f"run {steps}" + ("" if fresh else " pre no post no"))
                 step, fresh = step + steps, False
             feed("include checkpoint.in")
@@ -237,14 +231,6 @@ class ChunkedStage(ABC):
         )
         assert self.fluid is not None
         forces = self.fluid.forces(spheres, moment)
-        share = largest_share(spheres, forces, density, dt * self.scales.hold_steps)
-        if self.case.drag.scheme != "implicit" and share > DRAG_LIMIT:
-            raise LiggghtsError(
-                f"{self.folder}: at step {spheres.step} drag is constant for {share:.3g} "
-                f"relaxation times of a fine in the crowd (limit {DRAG_LIMIT:g}), explicit drag "
-                "would overshoot; take drag.scheme = 'implicit', or lower run.time_step_factor, "
-                "and start over with --force"
-            )
         write_forces(self.folder, spheres, forces)
         updates.add(step, step * dt, forces.measures)
         feed("include fluid.in")
@@ -264,13 +250,11 @@ class ChunkedStage(ABC):
 def steps_between(case: InvasionCase, scales: InvasionScales, pace: float) -> int:
     """Steps in which a fine at `pace` m/s covers `drag.update_travel` smallest diameters.
 
-    They are whole refreshes of the drag, at least one.
+    They are at least one, and at most those of a chunk.
     """
     travel = case.drag.travel_diameters * 2 * case.fines.radius_range_m[0]
-    refresh = scales.time_step * scales.hold_steps
-    most = scales.checkpoint_steps // scales.hold_steps
-    refreshes = travel / (pace * refresh) if pace > 0 else math.inf
-    return max(1, math.floor(min(refreshes, most))) * scales.hold_steps
+    steps = travel / (pace * scales.time_step) if pace > 0 else math.inf
+    return max(1, math.floor(min(steps, scales.checkpoint_steps)))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -8,7 +8,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS
 from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import Contact, contacts_of, overlaps_of, two_digits_up
-from fdnet.scales.drag import Crowd, crowd_drag_factor, push_of
+from fdnet.scales.drag import push_of
 from fdnet.scales.flow import Drive, Velocity, drive_of, velocity_of
 from fdnet.scales.pack import target_porosity
 
@@ -193,8 +193,6 @@ DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
 refuses the case."""
 SAFE_FACTOR = 0.2
 """Time step over sqrt(m/k) that is accepted with any contact."""
-RANDOM_CLOSE = 0.36
-"""Porosity of random close packing of equal spheres (Scott and Kilgour 1969)."""
 _ROUNDING = 1 + 1e-12
 
 
@@ -289,14 +287,6 @@ def hold_steps(case: Case, step: float, tau: float, longest: float) -> int:
             f"{longest:.3g} s between checkpoints; expected at most {most}"
         )
     return given
-
-
-def densest_factor(case: Case) -> float:
-    """Factor on the drag of a fine in a random close packing of fines; 1 without a crowd."""
-    if case.drag.crowd == "none":
-        return 1.0
-    crowd = Crowd(porosity=RANDOM_CLOSE)
-    return float(crowd_drag_factor(crowd)) / RANDOM_CLOSE
 
 
 def drag_warnings(case: Case, held: float) -> list[Doubt]:

@@ -30,9 +30,9 @@ FINE_SECONDS = {"held": 1.4e-7, "implicit": 1.4e-7, "viscous": 1.35e-7}
 CACHED_FINES = 8000
 """Fines n cost (1 + n / (n + CACHED_FINES)) times as much each: their neighbours leave the
 cache."""
-UPDATE_SECONDS = {"network": (0.03, 9.0e-5), "uniform": (0.004, 1.4e-5)}
-"""Seconds of one update of the forces that fdnet computes itself, by `drag.field`: at least, and
-for each grain and fine."""
+UPDATE_SECONDS = (0.03, 9.0e-5)
+"""Seconds of one update of the flow that follows the deposit: at least, and for each grain and
+fine."""
 FALLING_RATE = 0.6
 """Mean rate over the first, where the deposit slows the flow."""
 WAITING, TRICKLING = 2.0, 1.4
@@ -84,10 +84,9 @@ def cost_of(case: Case, scales: Scales) -> Cost:
     fines = scales.supplied_count * present_share(case, duration=duration, feeding=feeding)
     updates = 0.0
     if drag.coupled:  # the travel of the fluid over that of one update
-        falling = FALLING_RATE if drag.field == "network" else 1.0
-        way = falling * scales.drive_velocity * duration
+        way = FALLING_RATE * scales.drive_velocity * duration
         count = way / (drag.travel_diameters * 2 * case.fines.radius_range_m[0])
-        least, each = UPDATE_SECONDS[drag.field]
+        least, each = UPDATE_SECONDS
         updates = count * (least + each * (grains + fines))
     grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
     fine = FINE_SECONDS[drag.scheme] * (1 + fines / (fines + CACHED_FINES))

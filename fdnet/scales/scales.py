@@ -8,7 +8,6 @@ from fdnet.case.tables import CleanUp
 from fdnet.errors import CaseError, Doubt
 from fdnet.scales.clock import (
     chunk_refreshes,
-    densest_factor,
     drag_warnings,
     drive_in,
     hold_steps,
@@ -188,7 +187,7 @@ def _invasion(case: InvasionCase, flow: Velocity, shared: Scales) -> InvasionSca
     shortest = relaxation[0] * push.relaxation_share(small)
     step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
-    hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
+    hold = hold_steps(case, step, shortest, times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
     overlaps = overlaps_of(case, contact, flow, drive, shared.porosity)

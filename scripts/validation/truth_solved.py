@@ -185,9 +185,9 @@ def touching_three(corner: Array, reach: Array, rng: np.random.Generator) -> Arr
 
 # Specimens, which LIGGGHTS makes.
 
-UNIFORM = {"upstream": "interstitial", "pressure_gradient": False}
-FOLLOWED = {"field": "network", "update_travel": 0.5, "upstream": "darcy", "crowd": "beetstra"}
-FOLLOWED |= {"pressure_gradient": True, "scheme": "implicit"}
+UNIFORM = {"field": "uniform", "inertia": "none", "upstream": "interstitial"}
+UNIFORM |= {"pressure_gradient": False}
+FOLLOWED = {"field": "network", "update_travel": 0.5}
 """The flow follows the deposit; the contacts are ten times as stiff for its larger forces."""
 
 
@@ -206,9 +206,10 @@ def case_of(name: str) -> Case:
             "box": {"size_mm": [2.5, 1.2, 1.2], "sides": "periodic", "wall_friction": 0.0},
             "grains": grains | pack,
             "fines": fines | {"count": int(row["supplied"]), "supply": "slab"},
-            "fluid": {"darcy_length_mm": 8.0},
+            "fluid": {"darcy_length_mm": 8.0, "darcy_law": "darcy"},
+            "contact": {"restitution": "dry"},
             "drag": FOLLOWED if followed else UNIFORM,
-            "run": {"time_step_factor": 0.1} | ({"stiffness_N_m": 1e5} if followed else {}),
+            "run": {"time_step_factor": 0.1} | {"stiffness_N_m": 1e5 if followed else 1e4},
             "analysis": {"sections": 5},
         }
     )

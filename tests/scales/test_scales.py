@@ -55,7 +55,7 @@ def test_springs_in_series_and_smaller_friction(specimen1):
     assert ratio == pytest.approx(31.5 / 47.15, rel=1e-9)
 
 
-FOLLOWED = ("drag.field=network", "drag.upstream=darcy", "fines.supply=slab", "fines.count=100")
+FOLLOWED = ('drag={field = "network"}', "fines.supply=slab", "fines.count=100")
 
 
 def test_stiffness_auto_is_the_least_that_keeps_overlaps_small():
@@ -63,7 +63,6 @@ def test_stiffness_auto_is_the_least_that_keeps_overlaps_small():
         with naming(model):
             keys = (
                 *FOLLOWED,
-                "drag.scheme=implicit",
                 f"contact.model={model}",
                 "fluid.velocity_m_s=5",
             )
