@@ -520,7 +520,7 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
         )
     if (
         good("drag.drive_velocity_m_s", "contact.cohesion_J_m3")
-        and drag.drive_velocity_m_s is not None
+        and drag.drive_velocity_m_s not in ("auto", "fluid")
         and contact.cohesion_J_m3 is not None
     ):
         yield (

@@ -272,9 +272,13 @@ class Drag(Part):
     )
     refresh_steps: Annotated[int, Field(ge=1)] | None = None
     """Steps for which "held" keeps the force. When absent: at most 0.05 of the relaxation time."""
-    drive_velocity_m_s: Positive | Literal["auto"] | None = None
-    """Velocity in the pores of the simulation, to shorten a run with a weak push. All forces are
-    scaled by the same factor. Allowed up to an impact Stokes number of 1; "auto" drives to 0.1."""
+    drive_velocity_m_s: Positive | Literal["auto", "fluid"] = Field(
+        "auto",
+        description="Velocity in the pores of the simulation, to shorten a run with a weak push. "
+        "All forces are scaled by the same factor. Allowed up to an impact Stokes number of 1; "
+        '"auto" (when absent with the field "network") drives to 0.1, but never slower than the '
+        'fluid moves and not with cohesion; "fluid" (when absent with "uniform") is its own.',
+    )
     upstream: Literal["darcy", "interstitial"] = "darcy"
     """Velocity upstream of the face: "darcy", or, with the field "uniform", "interstitial" as in
     the pack, which brings the mud too fast."""
@@ -301,7 +305,7 @@ class Drag(Part):
     def _as_usual_in_a_uniform_field(cls, given: Any) -> Any:
         if not isinstance(given, Mapping) or given.get("field") != "uniform":
             return given
-        filled = {"scheme": "held"} | dict(given)
+        filled = {"scheme": "held", "drive_velocity_m_s": "fluid"} | dict(given)
         if filled["scheme"] in ("implicit", "viscous"):
             filled.setdefault("inertia", "none")
         return filled

@@ -314,15 +314,21 @@ def back_flow(case: InvasionCase) -> BackFlow:
 
 
 def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
-    """The case with the drawdown for its overbalance, driven by the same factor as before.
+    """The case with the drawdown for its overbalance, driven at most by the same factor as before.
 
     What its table [run] says of the length of the invasion is that of the clean-up.
     """
     fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
-    undriven = case.drag.model_copy(update={"drive_velocity_m_s": None})
+    undriven = case.drag.model_copy(update={"drive_velocity_m_s": "fluid"})
     turned = case.model_copy(update={"fluid": fluid, "run": run, "drag": undriven})
-    if case.drag.drive_velocity_m_s is None:
+    asked = case.drag.drive_velocity_m_s
+    if asked == "fluid":
         return turned
-    driven = scales_of(turned).interstitial_velocity * invasion_scales(case).force_factor
-    drag = case.drag.model_copy(update={"drive_velocity_m_s": driven})
+    own = scales_of(turned).interstitial_velocity
+    driven = own * invasion_scales(case).force_factor
+    if asked == "auto":
+        driven = min(
+            driven, invasion_scales(turned.model_copy(update={"drag": case.drag})).drive_velocity
+        )
+    drag = case.drag.model_copy(update={"drive_velocity_m_s": driven if driven > own else "fluid"})
     return turned.model_copy(update={"drag": drag})

@@ -185,8 +185,9 @@ def touching_three(corner: Array, reach: Array, rng: np.random.Generator) -> Arr
 
 # Specimens, which LIGGGHTS makes.
 
-UNIFORM = {"field": "uniform", "inertia": "none", "upstream": "interstitial"}
-UNIFORM |= {"pressure_gradient": False}
+UNIFORM = {"field": "uniform", "inertia": "none", "upstream": "interstitial"} | {
+    "pressure_gradient": False
+}
 FOLLOWED = {"field": "network", "update_travel": 0.5}
 """The flow follows the deposit; the contacts are ten times as stiff for its larger forces."""
 

@@ -352,11 +352,11 @@ def test_a_drive_that_inertia_forbids_is_refused():
     assert f"expected at most {most:.2g} m/s" in str(caught.value)
     with pytest.raises(CaseError, match="in the fluid itself"):
         scales_of(tiny(f"fluid.velocity_m_s={2 * most}", "drag.drive_velocity_m_s=0.1"))
-    with pytest.raises(CaseError, match="in the fluid itself"):
-        scales_of(tiny(f"fluid.velocity_m_s={2 * most}", "drag.drive_velocity_m_s=auto"))
     keys = ("contact.model=hertz", "contact.cohesion_J_m3=1e4")
-    with pytest.raises(CaseError, match=r"drag\.drive_velocity_m_s: auto with .*cohesion is not"):
-        tiny("drag.drive_velocity_m_s=auto", *keys)
+    with pytest.raises(CaseError, match=r"drag\.drive_velocity_m_s: 0.1 with .*cohesion is not"):
+        tiny("drag.drive_velocity_m_s=0.1", *keys)
+    for kept in ([f"fluid.velocity_m_s={2 * most}"], [*keys, WELL]):
+        assert scales_of(tiny("drag.drive_velocity_m_s=auto", *kept)).force_factor == 1.0
 
 
 @pytest.mark.liggghts
