@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.case.tables import Run
-from fdnet.errors import Doubt
+from fdnet.errors import SHOWN, Doubt
 from fdnet.names import STAGES
 from fdnet.report.tables import (
     AGREES,
@@ -338,7 +338,11 @@ def summary_lines(summary: Mapping[str, Any]) -> Iterator[str]:
                 f"({rule['limit']})"
             )
         yield ""
-    yield from (f"warning: {warning}" for warning in summary["warnings"])
+    warnings = summary["warnings"]
+    for warning in warnings[:SHOWN]:
+        yield from textwrap.wrap(f"warning: {warning}", WIDTH, subsequent_indent="    ")
+    if (more := len(warnings) - SHOWN) > 0:
+        yield f"{more} more warning{'s' if more > 1 else ''} in report.html and summary.json"
 
 
 def seconds_line(summary: Mapping[str, Any]) -> str:
