@@ -25,7 +25,7 @@ from fdnet.dem.deck import number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
 from fdnet.errors import CaseError, Doubt, DumpError, LiggghtsError, explained
 from fdnet.files import write_text
-from fdnet.scales.clock import arrival_time
+from fdnet.scales.clock import PRESSED, arrival_time, rises
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.geometry import groups_apart, max_overlap
@@ -401,6 +401,33 @@ def flow_says(folder: Path, case: InvasionCase, scales: InvasionScales, step: in
     return None
 
 
+def time_of(row: Checkpoint, scales: InvasionScales) -> float:
+    """Time of the simulation, s, at a checkpoint; chunks take one time, in more or fewer steps."""
+    return row.chunk * scales.checkpoint_steps * scales.time_step
+
+
+# ------------------------------------------------------------------------------------------------
+# Springs that grow with the load, where `run.stiffness_N_m` is "auto" and the flow follows the
+# deposit: steps of a chunk go with the root of the stiffness, so history.csv records it.
+
+
+RAISE_ABOVE, RAISE_TO, MOST_RAISE = 0.67, 0.5, 2.0
+"""Shares of `PRESSED`: springs are stiffened at a checkpoint when the largest overlap of the chunk
+before was above the first, so that it would have been the second. At most so many times the steps
+at once."""
+
+
+def steps_after(case: InvasionCase, scales: InvasionScales, steps: int, overlap: float) -> int:
+    """Steps of the chunk after one of `steps` steps with a largest `overlap` of a fine.
+
+    An overlap goes with the stiffness k to the power -1 (Hertz -2/3), the step with k to -1/2.
+    """
+    if not rises(case) or overlap <= RAISE_ABOVE * PRESSED:
+        return steps
+    power = 0.75 if case.contact.model == "hertz" else 0.5
+    return math.ceil(steps * min(MOST_RAISE, (overlap / (RAISE_TO * PRESSED)) ** power))
+
+
 # ------------------------------------------------------------------------------------------------
 # The states of checkpoints, from their dumps.
 
@@ -428,7 +455,8 @@ def state_at(
     """
     stage = "invade" if isinstance(row, Checkpoint) else "clean"
     frame = read_frame(folder / "post" / f"{stage}_{row.step}.dump")
-    moved = snapshot_of(frame, case, time_s=row.step * scales.time_step)
+    time = time_of(row, scales) if isinstance(row, Checkpoint) else row.step * scales.time_step
+    moved = snapshot_of(frame, case, time_s=time)
     return moved if case.grains.motion == "mobile" else grains.joined(moved)
 
 

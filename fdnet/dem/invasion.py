@@ -40,6 +40,8 @@ from fdnet.dem.checkpoint import (
     read_updates,
     read_watch,
     readable_states,
+    state_at,
+    steps_after,
 )
 from fdnet.dem.deck import Deck, LeftOut, snapshot_of
 from fdnet.dem.invade_deck import (
@@ -61,7 +63,8 @@ from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
 from fdnet.dem.supply import batches_of, densities, later_batch
 from fdnet.errors import CaseError, Doubt, LiggghtsError
 from fdnet.files import disk_is_full, write_text
-from fdnet.scales.scales import InvasionScales
+from fdnet.scales.clock import rises
+from fdnet.scales.scales import InvasionScales, stiffened
 from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Snapshot
 
@@ -114,6 +117,15 @@ class ChunkedStage(ABC):
     def begin_chunk(self, feed: Feed, updates: Updates, last: Any | None) -> None:  # noqa: B027
         """Feed what a coupled stage takes in before the chunk after `last`."""
 
+    def pace(self, last: Any | None) -> InvasionScales:
+        """The scales of the chunk after `last`: its steps, and the springs that these bear."""
+        return self.scales
+
+    def time_at(self, last: Any | None, steps: float = 0) -> float:
+        """Time of the simulation, s, `steps` of the first length after the checkpoint `last`."""
+        steps += self.first_step + (last.chunk if last else 0) * self.scales.checkpoint_steps
+        return steps * self.scales.time_step
+
     def drive(self) -> tuple[Deck, tuple[Execution, ...]]:
         """Run to the end, from the last whole checkpoint; nothing is run where that is the end.
 
@@ -129,6 +141,7 @@ class ChunkedStage(ABC):
             )
         (self.folder / "post").mkdir(parents=True, exist_ok=True)
         self.points.refuse_another_way(self.launch.ranks)
+        runs: tuple[Execution, ...] = ()
         while True:
             last = self.points.last()
             self.points.doubt(last)
@@ -137,13 +150,15 @@ class ChunkedStage(ABC):
             if last is not None:
                 self.look_at(read_history(self.folder, self.points.kind), read_watch(self.folder))
                 if self.over(last):
-                    return deck, ()
+                    return deck, runs
             launch = replace(self.launch, follow=self.keeper())
             screen = self.folder / SCREEN
             screen.unlink(missing_ok=True)
             try:
                 play = None if self.fluid is None else partial(self._play, name, last)
-                return deck, (run_deck(self.folder, name, launch, play),)
+                runs += (run_deck(self.folder, name, launch, play),)
+                if self.fluid is None:
+                    return deck, runs
             except LiggghtsError:
                 if last is None or not screen.exists():
                     raise
@@ -193,48 +208,60 @@ class ChunkedStage(ABC):
         self.look_at(rows, overlaps)
 
     def _play(self, name: str, last: Any | None, feed: Feed) -> None:
-        """Feed LIGGGHTS a coupled stage, from the deck `name`.
+        """Feed LIGGGHTS a coupled stage, from the deck `name`, until its springs must be others.
 
         Raises DumpError when LIGGGHTS did not show its spheres, and what the fluid raises.
         """
         assert self.fluid is not None
         updates = Updates(self.folder, self.fluid.measured, upto=last.step if last else 0)
-        step = last.step if last else self.first_step
+        step, pace = last.step if last else self.first_step, self.pace(last)
         feed(f"include {name}")
         while last is None or not self.over(last):
+            if self.pace(last) != pace:
+                return
             self.begin_chunk(feed, updates, last)
-            end, fresh = step + self.scales.checkpoint_steps, True
+            end, fresh = step + pace.checkpoint_steps, True
             while step < end:
-                steps = min(self._update(feed, updates, step, end, fresh), end - step)
+                steps = self._update(feed, updates, last, pace, end - step)
                 feed(f"run {steps}" + ("" if fresh else " pre no post no"))
                 step, fresh = step + steps, False
             feed("include checkpoint.in")
             last = read_history(self.folder, self.points.kind)[-1]
 
-    def _update(self, feed: Feed, updates: Updates, step: int, end: int, fresh: bool) -> int:
-        """Compute the fluid's forces for the state at a `step` of a chunk that ends at `end`.
+    def _update(
+        self,
+        feed: Feed,
+        updates: Updates,
+        last: Any | None,
+        pace: InvasionScales,
+        left: int,
+    ) -> int:
+        """Compute the fluid's forces in the chunk after `last`, of which `left` steps remain.
 
-        Returns the steps they hold for.
+        Returns the steps they hold for, at most these.
         """
-        frame, dt = self.shown(feed), self.scales.time_step
-        spheres, density = self.spheres(frame, step * dt), fine_density(frame)
+        done = pace.checkpoint_steps - left
+        step = (last.step if last else self.first_step) + done
+        time = self.time_at(last, done * self.scales.checkpoint_steps / pace.checkpoint_steps)
+        frame, dt = self.shown(feed), pace.time_step
+        spheres, density = self.spheres(frame, time), fine_density(frame)
         shows = GIVEN[0] in frame.columns
         moment = Moment(
             step=step,
-            time=step * dt,
+            time=time,
             before=updates.last,
             first=updates.first,
-            fresh=fresh,
-            left=(end - step) * dt,
+            fresh=done == 0,
+            left=left * dt,
             given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0) if shows else None,
             density=density,
         )
         assert self.fluid is not None
         forces = self.fluid.forces(spheres, moment)
         write_forces(self.folder, spheres, forces)
-        updates.add(step, step * dt, forces.measures)
+        updates.add(step, time, forces.measures)
         feed("include fluid.in")
-        return steps_between(self.case, self.scales, forces.pace)
+        return min(steps_between(self.case, pace, forces.pace), left)
 
     def shown(self, feed: Feed) -> Frame:
         """The state that LIGGGHTS shows when it is asked."""
@@ -322,8 +349,9 @@ class InvadeStage(ChunkedStage):
             return write_invade_inputs(case, scales, grains, folder, ranks=ranks)
         if case.fines.supply == "batches":
             write_batches(case, scales, grains, folder)
-        write_parts(case, scales, grains, folder)
-        deck = render_invade(case, scales, grains, ranks=ranks, resume=last)
+        pace = self.pace(last)
+        write_parts(case, pace, grains, folder)
+        deck = render_invade(case, pace, grains, ranks=ranks, resume=last)
         write_text(folder / f"{self.deck}.resume", deck.text)
         return deck
 
@@ -335,6 +363,24 @@ class InvadeStage(ChunkedStage):
         ):
             return True
         return case.run.duration_s is None and quiet_enough(case, scales, last)
+
+    def pace(self, last: Checkpoint | None) -> InvasionScales:
+        """The scales of the chunk after `last`, with springs that bear what the chunk before saw.
+
+        They follow from what its checkpoint records: its steps, and the watched overlaps, or its
+        dump where none are watched.
+        """
+        case, scales = self.case, self.scales
+        if last is None or not rises(case):
+            return scales
+        rows = read_rows(self.folder)
+        begun = max((row.step for row in rows if row.step < last.step), default=0)
+        seen = [one for one in read_watch(self.folder) if begun < one.step <= last.step]
+        if not seen:
+            state = state_at(self.folder, last, case, scales, self.grains)
+            seen.append(overlap_in(case, state))
+        steps = steps_after(case, scales, last.step - begun, deepest_of(seen).fraction)
+        return stiffened(case, scales, steps)
 
     def look_at(self, history: Sequence[Checkpoint], overlaps: Sequence[Deepest]) -> None:
         """Raise LiggghtsError when a fine overlapped too much and `run.on_overlap` is "stop".
@@ -363,7 +409,7 @@ class InvadeStage(ChunkedStage):
             for which in range(entered, batches.entered_at(chunk)):
                 feed(f"include {SUPPLY}/batch_{which}.in")
         else:
-            time = (last.step if last else self.first_step) * scales.time_step
+            time = self.time_at(last)
             moved, velocity = 0.0, scales.upstream_velocity  # of the mud, m and m/s
             if updates.last is not None:
                 area, since = case.size_m[1] * case.size_m[2], time - updates.last["time_s"]

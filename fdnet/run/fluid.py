@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.checkpoint import Checkpoint, entered_by
+from fdnet.dem.checkpoint import Checkpoint, entered_by, time_of
 from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
@@ -223,8 +223,8 @@ def history_rows(
         flow = next((one for one in reversed(updates) if one["step"] < row.step), {})
         rows.append(
             {
-                "time_s": row.step * scales.time_step,
-                "physical_time_s": row.step * scales.time_step * scales.force_factor,
+                "time_s": time_of(row, scales),
+                "physical_time_s": time_of(row, scales) * scales.force_factor,
                 "supplied_count": batches.supplied(entered_by(case, batches, row)),
                 "invaded_count": row.invaded,
                 "passed_count": row.passed,

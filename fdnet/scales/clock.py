@@ -8,8 +8,16 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS
 from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import Contact, contacts_of, overlaps_of, two_digits_up
-from fdnet.scales.drag import push_of
-from fdnet.scales.flow import Drive, Velocity, drive_of, velocity_of
+from fdnet.scales.drag import Crowd, crowd_drag_factor, push_of
+from fdnet.scales.flow import (
+    Drive,
+    Velocity,
+    carman_kozeny,
+    drive_of,
+    driving_pressure,
+    path_of,
+    velocity_of,
+)
 from fdnet.scales.pack import target_porosity
 
 PLUG_SOLIDS = 0.6
@@ -193,6 +201,8 @@ DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
 refuses the case."""
 SAFE_FACTOR = 0.2
 """Time step over sqrt(m/k) that is accepted with any contact."""
+RANDOM_CLOSE = 0.36
+"""Porosity of random close packing of equal spheres (Scott and Kilgour 1969)."""
 _ROUNDING = 1 + 1e-12
 
 
@@ -322,14 +332,25 @@ PRESSED = 0.03
 """Largest predicted overlap of a fine over its diameter with `run.stiffness_N_m` = "auto"; the
 default of `run.max_overlap`."""
 
+STARTING = 0.25
+"""Stiffness over that of the largest chain of forces with which an invasion starts whose springs
+may be stiffened at a checkpoint."""
+
 AnyCase = TypeVar("AnyCase", bound=Case)
 
 
 def drive_in(case: InvasionCase, velocity: Velocity) -> Drive:
-    """How fast the simulation is driven; a free fine outruns the fluid by its drift."""
+    """How fast the simulation is driven; a free fine outruns the fluid by its drift.
+
+    Where the flow follows the deposit, drag stops a fine as in the crowd of its own mud.
+    """
     own = push_of(case, velocity.interstitial, velocity.pressure_gradient)
     free = own.velocity + own.drift(case.fines.radius_range_m[1])
-    return drive_of(case, own.velocity, relaxation_times(case)[1], free)
+    time = relaxation_times(case)[1]
+    if case.drag.field == "network":
+        mud = 1 - case.fines.placed_fraction
+        time /= float(crowd_drag_factor(Crowd(porosity=mud))) / mud
+    return drive_of(case, own.velocity, time, free)
 
 
 def relaxation_times(case: InvasionCase) -> tuple[float, float]:
@@ -339,12 +360,52 @@ def relaxation_times(case: InvasionCase) -> tuple[float, float]:
     return min(times), max(times)
 
 
-def stiff_enough(case: AnyCase) -> AnyCase:
+def deposit_pressure(case: InvasionCase, flow: Velocity, porosity: float) -> float:
+    """Largest pressure, Pa, that pack, deposit and cake can bear until the invasion ends.
+
+    They lie in series with the rest of the way. In lengths of the intact pack, of the length L and
+    the permeability k, the fines that can come until then, packed closely by Carman and Kozeny,
+    resist by
+
+        r = k h 180 (1 - e) / (d^2 e^3),
+
+    h their volume a unit of face, d their Sauter diameter, e = `RANDOM_CLOSE`. On the way w the
+    overbalance leaves them p (L + r) / (w + r), and a constant rate p (L + r) / w. A rate that
+    may fall to the share s (`run.stop_rate`) lets r grow to w (1 / s - 1).
+    """
+    run, fines, length = case.run, case.fines, case.size_m[0]
+    pressure = driving_pressure(case, flow.pressure_gradient)
+    way, inside = length, length
+    if case.fluid.velocity_m_s is None:
+        given = None if case.well is None else case.well.formation_permeability_m2
+        way, inside = path_of(case).viscous, min(length, path_of(case).viscous)
+        way = inside + (way - inside) * flow.permeability / (given or flow.permeability)
+    mud = [slab_of(case).length]
+    lasts = run.duration_s or run.cap_s
+    mud += [] if lasts is None else [lasts * flow.darcy]
+    mud += [] if run.stop_pore_volumes is None else [run.stop_pore_volumes * porosity * length]
+    bed = carman_kozeny(RANDOM_CLOSE, fines.sauter_diameter_m)
+    added = flow.permeability * fines.placed_fraction * min(mud) / ((1 - RANDOM_CLOSE) * bed)
+    if run.stop_rate is not None:
+        added = min(added, way * (1 / run.stop_rate - 1))
+    slowed = way + added if case.drag.slowed else way
+    return pressure * (inside + added) / slowed
+
+
+def rises(case: Case) -> bool:
+    """Whether the springs of an invasion are stiffened when the deposit asks for it."""
+    auto = case.run.stiffness_N_m == "auto" and case.run.time_step_s is None
+    return isinstance(case, InvasionCase) and case.drag.field == "network" and auto
+
+
+def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
     """The case with a number for `run.stiffness_N_m` = "auto"; any other case as it is.
 
-    It is the least number of two digits at which every predicted overlap is at most `PRESSED`, and
-    at least the default. A force presses a linear contact in by F / k and an impact by
-    w sqrt(m / k); by Hertz they go with the powers -2/3 and -2/5 of the modulus.
+    It is the least number of two digits at which every predicted overlap is at most `PRESSED`;
+    in the uniform field at least the default. A force presses a linear contact in by F / k and an
+    impact by w sqrt(m / k); by Hertz they go with the powers -2/3 and -2/5 of the modulus. Where
+    the springs may be stiffened later, and the `start` is asked for, a deposit gets `STARTING` of
+    what it needs.
     """
     if case.run.stiffness_N_m != "auto":
         return case
@@ -359,11 +420,13 @@ def stiff_enough(case: AnyCase) -> AnyCase:
     porosity = target_porosity(soft)
     flow = velocity_of(soft, porosity)
     contact = contacts_of(soft, flow.interstitial)["grain-fine"]
-    deep = overlaps_of(soft, contact, flow, drive_in(soft, flow), porosity)
+    borne = deposit_pressure(soft, flow, porosity)
+    deep = overlaps_of(soft, contact, flow, drive_in(soft, flow), porosity, borne)
     held, struck = (1.5, 2.5) if soft.contact.model == "hertz" else (1.0, 2.0)
     raised = max(
-        1.0,
-        (max(deep.drag, deep.deposit) / PRESSED) ** held,
+        0.0 if soft.drag.field == "network" else 1.0,
+        (deep.drag / PRESSED) ** held,
+        (deep.deposit / PRESSED) ** held * (STARTING if start and rises(case) else 1.0),
         (deep.impact / PRESSED) ** struck,
     )
     return stiff(two_digits_up(raised * DEFAULT_STIFFNESS))

@@ -8,7 +8,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.errors import CaseError, Doubt
 from fdnet.scales.drag import Push, arrival_velocity, pore_width, push_of, throat_width
-from fdnet.scales.flow import Drive, Velocity, driving_pressure
+from fdnet.scales.flow import Drive, Velocity
 
 # ------------------------------------------------------------------------------------------------
 # Hertz-Mindlin contacts in closed form, for pairs of spheres and for a sphere and a plane.
@@ -389,20 +389,24 @@ class Overlaps:
 
 
 def overlaps_of(
-    case: InvasionCase, contact: Contact, flow: Velocity, drive: Drive, porosity: float
+    case: InvasionCase,
+    contact: Contact,
+    flow: Velocity,
+    drive: Drive,
+    porosity: float,
+    pressure: float,
 ) -> Overlaps:
     """The overlaps in the `contact` of a grain and a fine, as simulated, in a pack of a porosity.
 
     A fine comes with the fluid and gains speed by the pressure gradient across a pore. A deposit
-    takes up all the pressure, which acts on the section of a throat; contacts hand the forces on
-    to each other, so that some bear several times as much (`LARGEST_CHAIN`).
+    bears the `pressure`, Pa of the fluid itself, which acts on the section of a throat; contacts
+    hand the forces on to each other, so that some bear several times as much (`LARGEST_CHAIN`).
     """
     push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
     deposit = 0.0
     if case.drag.field == "network":
-        pressure = drive.factor * driving_pressure(case, flow.pressure_gradient)
         throat = throat_width(porosity, flow.permeability)
-        deposit = LARGEST_CHAIN * pressure * math.pi / 4.0 * throat**2
+        deposit = LARGEST_CHAIN * drive.factor * pressure * math.pi / 4.0 * throat**2
     radius, mass = case.fines.radius_range_m[1], mass_range(case.fines)[1]
     width = pore_width(porosity, case.grains.sauter_diameter_m)
     lightest = min(one.density for one in case.fines.components)

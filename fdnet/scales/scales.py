@@ -1,18 +1,21 @@
 """The scales of a case in closed form; `scale_rows` has each formula and its source."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CleanUp
 from fdnet.errors import CaseError, Doubt
 from fdnet.scales.clock import (
+    STARTING,
     chunk_refreshes,
+    deposit_pressure,
     drag_warnings,
     drive_in,
     hold_steps,
     plug_warnings,
     relaxation_times,
+    rises,
     slab_of,
     slab_warnings,
     stiff_enough,
@@ -134,11 +137,13 @@ def scales_of(case: Case) -> Scales:
     overflows.
     """
     try:
-        case = stiff_enough(case)
+        rising, case = rises(case), stiff_enough(case)
         porosity = target_porosity(case)
         flow = velocity_of(case, porosity)
         shared = _shared(case, porosity, flow)
-        return _invasion(case, flow, shared) if isinstance(case, InvasionCase) else shared
+        if not isinstance(case, InvasionCase):
+            return shared
+        return _invasion(case, flow, shared, chain=STARTING if rising else 1.0)
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
             f"case {case.name}: a formula leaves the range of numbers ({error}); check units and "
@@ -174,7 +179,29 @@ def invasion_scales(case: InvasionCase) -> InvasionScales:
     return scales
 
 
-def _invasion(case: InvasionCase, flow: Velocity, shared: Scales) -> InvasionScales:
+def stiffened(case: InvasionCase, scales: InvasionScales, steps: int) -> InvasionScales:
+    """The scales of a chunk of the same time in `steps` steps, with springs as stiff as they bear.
+
+    The stiffness goes with the square of the number of steps.
+    """
+    if steps == scales.checkpoint_steps:
+        return scales
+    run, ratio = stiff_enough(case).run, steps / scales.checkpoint_steps
+    assert not isinstance(run.stiffness_N_m, str)
+    run = run.model_copy(update={"stiffness_N_m": run.stiffness_N_m * ratio**2})
+    stiff = case.model_copy(update={"run": run})
+    return replace(
+        scales,
+        stiffness_factor=stiffness_factor(stiff),
+        contacts=contacts_of(stiff, scales.interstitial_velocity),
+        time_step=scales.time_step / ratio,
+        checkpoint_steps=steps,
+    )
+
+
+def _invasion(
+    case: InvasionCase, flow: Velocity, shared: Scales, *, chain: float
+) -> InvasionScales:
     fines, fluid, multiplier = case.fines, case.fluid, case.drag.multiplier
     small, large = fines.radius_range_m
     speed, viscosity = flow.interstitial, fluid.viscosity_Pa_s
@@ -190,7 +217,8 @@ def _invasion(case: InvasionCase, flow: Velocity, shared: Scales) -> InvasionSca
     hold = hold_steps(case, step, shortest, times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    overlaps = overlaps_of(case, contact, flow, drive, shared.porosity)
+    borne = deposit_pressure(case, flow, shared.porosity)
+    overlaps = overlaps_of(case, contact, flow, drive, shared.porosity, chain * borne)
     sticking = sticking_of(case, contact, push, step)
     if chunk_steps > MOST_STEPS:
         raise CaseError(
@@ -321,6 +349,7 @@ def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
     fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
     undriven = case.drag.model_copy(update={"drive_velocity_m_s": "fluid"})
     turned = case.model_copy(update={"fluid": fluid, "run": run, "drag": undriven})
+    turned = stiff_enough(turned, start=False)
     asked = case.drag.drive_velocity_m_s
     if asked == "fluid":
         return turned
