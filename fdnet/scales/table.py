@@ -143,8 +143,9 @@ def _fine_rows(case: Case, scales: InvasionScales) -> Iterator[Quantity]:
     yield row(f"{case.contact.model}_drag", scales.drag_overlap)
     if case.drag.field == "network":
         yield row("deposit", scales.deposit_overlap, chain=LARGEST_CHAIN)
-    yield row("fines", scales.supplied_count)
-    yield row("slab", scales.slab_length)
+    most = ", at most" if case.fines.endless else ""
+    yield row("fines", scales.supplied_count, most=most)
+    yield row("slab", scales.slab_length, most=most)
     yield row("feeding", scales.slab_length / scales.upstream_velocity)
     yield row("plug_time", scales.plug_time)
     yield row("cap_time", scales.cap_time)
