@@ -415,10 +415,15 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
         and grains.count is None
     ):
         yield "grains.porosity: missing, give it (0 to 1) or grains.count"
-    if good("fines.count", "fines.slab_mm") and (fines.count is None) == (fines.slab_mm is None):
+    if good("fines.count", "fines.slab_mm") and fines.count and fines.slab_mm:
         yield (
-            f"fines.count: {fines.count} with fines.slab_mm: {fines.slab_mm}, "
-            "give exactly one of the two"
+            f"fines.count: {fines.count} with fines.slab_mm: {fines.slab_mm}, give one of the two,"
+            " or none for mud that comes until the stop rule"
+        )
+    if good("fines.count", "fines.slab_mm") and fines.endless and fines.supply == "slab":
+        yield (
+            "fines.supply: 'slab' puts all fines in at the start, but nothing says how many; give "
+            "fines.count or fines.slab_mm, or take 'batches'"
         )
     # Their number is bounded by memory, their plain sum of volumes by the box.
     if good("box.size_mm", "grains.radius_mm", "grains.porosity", "grains.count"):

@@ -163,7 +163,8 @@ def coupled_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
         return {}
     shown = dump_variables(case)
     asked = {"dump_columns": _shown_columns(case), "dump_group": shown["dump_group"]}
-    counted = shown | {"allowance": plug_allowance(case, scales)}
+    follows = case.drag.field == "network"
+    counted = shown | {"allowance": plug_allowance(case, scales), "follows": follows}
     parts = {
         "ask.in": render_text("ask.in.j2", asked | {"state": STATE}),
         "fluid.in": render_text("fluid.in.j2", {}),
@@ -337,6 +338,7 @@ def render_invade(
             # they follow from the distance that it has moved
             "feeding": {"first": AT_ONCE, "last": batches - 1} if batches > AT_ONCE else None,
             "slowed": case.drag.slowed,
+            "follows": case.drag.field == "network",
             "supply": SUPPLY,
             "chunks": chunks_of(case, scales),
             "stop_when_plugged": case.run.duration_s is None,

@@ -63,7 +63,7 @@ from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
 from fdnet.dem.supply import batches_of, densities, later_batch
 from fdnet.errors import CaseError, Doubt, LiggghtsError
 from fdnet.files import disk_is_full, write_text
-from fdnet.scales.clock import rises
+from fdnet.scales.clock import ARRIVALS, rises
 from fdnet.scales.scales import InvasionScales, stiffened
 from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Snapshot
@@ -315,7 +315,7 @@ class EndedStage:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Invasion(EndedStage):
-    """A finished invasion; its `stop_reason` is also "plugged" or "supply_exhausted".
+    """A finished invasion; `stop_reason` is also "plugged", "supply_exhausted" or "mud_cut_off".
 
     Attributes:
         supplied: number of fines that took part: all, or those of the batches that had come.
@@ -362,7 +362,7 @@ class InvadeStage(ChunkedStage):
             self.folder, case, scales, last.step
         ):
             return True
-        return case.run.duration_s is None and quiet_enough(case, scales, last)
+        return case.run.duration_s is None and quiet_enough(self.folder, case, scales, last)
 
     def pace(self, last: Checkpoint | None) -> InvasionScales:
         """The scales of the chunk after `last`, with springs that bear what the chunk before saw.
@@ -428,7 +428,8 @@ class InvadeStage(ChunkedStage):
     def ending(self, history: Sequence[Checkpoint]) -> tuple[str, list[str]]:
         """The stop reason, and warnings.
 
-        An empty slab decides nothing about plugging, so it is a reason of its own.
+        An empty slab decides nothing about plugging, so it is a reason of its own: fewer than
+        `ARRIVALS` fines wait upstream. Mud without an end was cut off then.
         """
         case, scales, last = self.case, self.scales, history[-1]
         waiting = last.upstream - last.removed_upstream
@@ -436,8 +437,9 @@ class InvadeStage(ChunkedStage):
         reason = flow_says(self.folder, case, scales, last.step)
         if reason is None and case.run.duration_s is not None:
             reason = "duration"
-        elif reason is None and quiet_enough(case, scales, last):
-            reason = "plugged" if waiting > 0 else "supply_exhausted"
+        elif reason is None and quiet_enough(self.folder, case, scales, last):
+            reason = "mud_cut_off" if case.fines.endless else "supply_exhausted"
+            reason = "plugged" if waiting >= ARRIVALS else reason
         elif reason is None:
             reason, cap = "cap", scales.cap_time * scales.force_factor
             warnings.append(
@@ -447,11 +449,20 @@ class InvadeStage(ChunkedStage):
                     "held: raise run.cap_ms",
                 )
             )
-        if waiting == 0:
+        if case.fines.endless and (waiting == 0 or reason == "mud_cut_off"):
+            warnings.append(
+                Doubt(
+                    "mud-cut-off",
+                    f"the mud was cut off after {scales.supplied_count} fines "
+                    f"({1e3 * scales.slab_length:.3g} mm of mud): give fines.slab_mm for more",
+                )
+            )
+        elif waiting == 0 or reason == "supply_exhausted":
+            left = f"only {waiting} fines are" if waiting else "no fine is"
             warnings.append(
                 Doubt(
                     "empty-slab",
-                    "no fine is left upstream: the end was decided by an empty slab, raise "
+                    f"{left} left upstream: the end was decided by an empty slab, raise "
                     "fines.count or fines.slab_mm",
                 )
             )

@@ -103,6 +103,7 @@ ENDS = {
     "supply_exhausted": "the supply of fines ran out (the face is still open)",
     "duration": "the set time or volume was over (the face may still be open)",
     "cap": "the run reached its cap before anything else ended it",
+    "mud_cut_off": "the most mud that may come was used up before the face plugged",
 }
 CAKE_BY = {
     "flow": "the flow of the last update",
@@ -119,10 +120,12 @@ def end_words(summary: Mapping[str, Any], control: Run) -> str:
         return ENDS[reason]
     if control.stop_rate is not None and rate is not None and rate <= control.stop_rate:
         return f"the rate of flow fell below {percent(control.stop_rate)} % of the first"
+    most = "no fine"
     if control.plug_rate:
         most = f"at most {percent(control.plug_rate)} % of the fines of the undisturbed mud"
+    if rate is None:
         return f"the face plugged: {most} crossed it for the set time"
-    return "the face plugged: no fine crossed it for the set time"
+    return f"the face plugged: {most} entered or left for the set time, and those inside rest"
 
 
 def in_place_words(counts: Mapping[str, int]) -> str:
@@ -173,9 +176,12 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
         two_digits(damage["lost_from"]),
     )
     if summary["final"] is False:
+        cut, more = "the run was cut at its cap", "raise run.cap_ms"
+        if summary["stop_reason"] == "mud_cut_off":
+            cut, more = "the mud was cut off", "give a longer fines.slab_mm"
         return (
-            f"So far {p95}, but the run was cut at its cap and this is not final: raise "
-            "run.cap_ms and run it again (--force) before you use these numbers."
+            f"So far {p95}, but {cut} and this is not final: {more} and run it again (--force) "
+            "before you use these numbers."
         )
     if not damage["zone_depth_m"]:
         return f"{p95}, and no layer loses {limit} of its permeability: the damage is negligible."

@@ -67,7 +67,7 @@ def summarise(
         "invasion_depth_p95_m": analysis.invasion_depth_p95,
         "cake_thickness_m": analysis.cake_thickness,
         "stop_reason": stop,
-        "final": stop != "cap" if invasion else None,
+        "final": stop not in ("cap", "mud_cut_off") if invasion else None,
         "sections": section_rows(analysis),
         "pores": len(network.pore_radius),
         "throats": len(network.throat_radius),

@@ -120,19 +120,26 @@ def expected_duration(case: InvasionCase, scales: InvasionScales) -> float:
     return min(scales.cap_time, slower * feeding * min(1.0, share) + watched)
 
 
+def expected_fines(case: Case, scales: Scales) -> float:
+    """Fines supplied; of mud that comes until the stop rule, those that come until then."""
+    if not isinstance(case, InvasionCase) or not isinstance(scales, InvasionScales):
+        return 0
+    come = expected_duration(case, scales) * scales.upstream_velocity / scales.slab_length
+    return scales.supplied_count * (min(1.0, come) if case.fines.endless else 1)
+
+
 def peak_memory(case: Case, scales: Scales) -> float:
     """Memory of the largest process of a run, bytes: that of the report, or of the network.
 
     The network of all spheres takes most, up to the number that it is used for.
     """
-    fines = scales.supplied_count if isinstance(scales, InvasionScales) else 0
-    return REPORT_BYTES + NETWORK_BYTES * min(grain_count(case) + fines, MOST_SPHERES)
+    spheres = grain_count(case) + expected_fines(case, scales)
+    return REPORT_BYTES + NETWORK_BYTES * min(spheres, MOST_SPHERES)
 
 
 def memory_bytes(case: Case, scales: Scales) -> float:
     """Memory of LIGGGHTS."""
-    fines = scales.supplied_count if isinstance(scales, InvasionScales) else 0
-    return 9e6 + BYTES_PER_SPHERE * (grain_count(case) + fines)
+    return 9e6 + BYTES_PER_SPHERE * (grain_count(case) + expected_fines(case, scales))
 
 
 def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = True) -> str:
@@ -162,7 +169,8 @@ def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = 
         remedy = "lower run.stiffness_N_m (the time goes with its square root)"
     return (
         f"{refusal}: {cost.steps:.3g} steps of {scales.time_step:.3g} s ({reason}) with "
-        f"{scales.supplied_count} fines and {grain_count(case)} {case.grains.motion} grains: "
+        f"{expected_fines(case, scales):.0f} fines and {grain_count(case)} {case.grains.motion} "
+        "grains: "
         f"{remedy}, supply fewer fines, shorten run.duration_ms or run.cap_ms, or raise "
         "run.max_hours"
     )

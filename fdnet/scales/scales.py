@@ -78,7 +78,7 @@ class InvasionScales(Scales):
         force_factor: drive velocity over the fluid's own; the factor on all forces on a fine, and
             physical time over simulated time.
         upstream_velocity: m/s, upstream of the formation face, as simulated.
-        supplied_count: number of fines in the slab.
+        supplied_count: number of fines in the slab; the most that come where the mud has no end.
         slab_length: m, along the flow.
         relaxation_time: s, of the drag on the smallest and on the largest fine.
         time_step: s, of the invasion.
@@ -205,7 +205,8 @@ def _invasion(
     fines, fluid, multiplier = case.fines, case.fluid, case.drag.multiplier
     small, large = fines.radius_range_m
     speed, viscosity = flow.interstitial, fluid.viscosity_Pa_s
-    slab, relaxation = slab_of(case), relaxation_times(case)
+    throat = 2 * large / throat_width(shared.porosity, flow.permeability)
+    slab, relaxation = slab_of(case, throat), relaxation_times(case)
     drive = drive_in(case, flow)
     push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
     upstream = drive.velocity
@@ -226,7 +227,6 @@ def _invasion(
             f"(limit {MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms"
         )
     reynolds = fluid.density_kg_m3 * speed * 2 * large / viscosity
-    throat = 2 * large / throat_width(shared.porosity, flow.permeability)
     displaced = fluid.density_kg_m3 * case.gravity.buoyancy
     excess = max(abs(one.density - displaced) for one in fines.components)
     weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
