@@ -105,12 +105,6 @@ ENDS = {
     "cap": "the run reached its cap before anything else ended it",
     "mud_cut_off": "the most mud that may come was used up before the face plugged",
 }
-CAKE_BY = {
-    "flow": "the flow of the last update",
-    "network": "the network of the cake",
-    "kozeny": "Carman and Kozeny",
-}
-"""What says the cake's share of the resistance."""
 
 
 def end_words(summary: Mapping[str, Any], control: Run) -> str:
@@ -143,19 +137,14 @@ def in_place_words(counts: Mapping[str, int]) -> str:
 
 def cake_words(summary: Mapping[str, Any]) -> str:
     """How the cake lets the fluid through; `summary` has the keys of `cake_summary`."""
-    table = summary.get("cake_by_depth")
-    if table is None:
-        return "no fine upstream touches the pack"
-    k, network, own = table["k_kozeny_m2"], table["k_network_m2"], table["too_thin"]
-    if k is not None:
-        porosity = f"at a porosity of {table['porosity']:.2f}"
-        own = f"{in_millidarcy(k)} mD by Carman and Kozeny {porosity}"
-    if network is not None:
-        own += f", {in_millidarcy(network)} mD by its own network"
-    return (
-        f"{table['fines']} fines, {own}; about {percent(summary['cake_resistance_share'])} % of "
-        f"the resistance of cake and specimen by {CAKE_BY[table['share_by']]}"
+    cake, share = summary["cake"], percent(summary["cake_resistance_share"])
+    if cake is None:
+        return "no cake yet: no fine stands before the face"
+    own = cake["no_cake_yet"] or (
+        f"{in_millidarcy(cake['k_m2'])} mD by Beetstra's law of drag at a porosity of "
+        f"{cake['porosity']:.2f}"
     )
+    return f"{cake['fines']} fines, {own}; {share} % of the resistance of cake and specimen"
 
 
 def answer_sentence(summary: Mapping[str, Any]) -> str:

@@ -20,6 +20,7 @@ from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
 from fdnet.network.field.field import VelocityField
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
+from fdnet.run.cake import standing_cake
 from fdnet.run.network_flow import (
     RENEWED,
     Carried,
@@ -339,8 +340,13 @@ class NetworkFluid:
         order = np.argsort(fines.id)
         rows = order[np.searchsorted(fines.id[order], deposit.fines.id)]
         pressed[rows] = on_each_fine(carried.pressed, deposit)
-        held, caked = standing & within & np.any(pressed != 0.0, axis=1), standing & (depth < 0)
-        cake = float(crowd[caked] @ shape[caked, 0]) / pack.network.area
+        held = standing & within & np.any(pressed != 0.0, axis=1)
+        stack = standing_cake(spheres, self.case.periodic)
+        cake = scales.push.coefficient / (6.0 * np.pi) * float(stack.resistance.sum())
+        # the pack's own flow knows no cake: the forces on its fines add up to its pressure drop
+        caked = standing & np.isin(fines.id, stack.fines.id)
+        drawn = float(crowd[caked] @ shape[caked, 0])
+        shape[caked] *= cake * pack.network.area / drawn if drawn > 0 else 1.0
         moving = np.where(within & ~held, crowd, 0.0) / pack.network.area
         slow, gain = float(moving @ shape[:, 0]), float(moving @ fines.velocity[:, 0])
         speed = self._velocity(carried, cake + slow, gain)
@@ -365,7 +371,6 @@ class NetworkFluid:
         on_fines = float(drag[within].sum()) + float(pressed[outside, 0].sum())
         on_grains, on_held = drop * float(carried.pressed.grains[0]), float(pressed[held, 0].sum())
         whole, law = (drop + loose) * pack.network.area, float(crowd[held] @ fluid[held, 0])
-        dense = float(np.mean(1.0 - near.porosity[caked])) if caked.any() else 0.0
         # rates and pressures are those of the fluid itself, which is slower than a driven one
         driven, filtrate = scales.force_factor, 0.0
         if moment.before is not None:
@@ -388,7 +393,7 @@ class NetworkFluid:
                 "momentum_defect": _over(abs(on_fines + on_grains - whole), whole),
                 "fines_share": _over(on_held, whole),
                 "crowd_over_network": _over(law, on_held),
-                "cake_thickness_m": _over(float(np.sum(volume[caked])), pack.network.area * dense),
+                "cake_thickness_m": stack.thickness,
                 "pores_stagnant": carried.stagnant,
                 "fines_standing": int(np.sum(standing & within)),
             },

@@ -24,6 +24,7 @@ from fdnet.dem.liggghts import Launch, find_binary, run_deck
 from fdnet.dem.supply import batches_of, densities
 from fdnet.errors import CaseError
 from fdnet.network.field.field import velocity_field
+from fdnet.run.cake import cake_summary, measure_cake
 from fdnet.run.fluid import Movers, NetworkFluid, fluid_of, history_rows, mean_ahead
 from fdnet.run.network_flow import (
     Renewal,
@@ -168,19 +169,27 @@ def test_the_rate_follows_the_resistances_in_series(fluid, done):
     assert carried.ratio.max() > 1.05
 
 
-def test_a_standing_cake_takes_the_pressure_of_carman_and_kozeny(fluid):
-    """Sixteen layers of a cubic bed upstream, 0.1 mm apart, at rest."""
-    spacing, radius = 1e-4, 4.9e-5
+def test_a_standing_cake_takes_the_pressure_of_the_summary_and_of_carman_and_kozeny(fluid):
+    """Sixteen layers of a cubic bed of touching fines before a layer inside the pack, at rest."""
+    spacing, radius = 1e-4, 5e-5
     axis = np.arange(spacing / 2, 1e-3, spacing)
-    x = -2e-3 + spacing * np.arange(-8, 8)
+    x = spacing * (np.arange(-16, 1) + 0.5)
     place = np.stack(np.meshgrid(x, axis, axis, indexing="ij"), -1).reshape(-1, 3)
     bed = fluid.grains.joined(fines(place, radius, fluid.grains.box))
-    row = fluid.forces(bed, FIRST).measures
-    solid = 4 / 3 * np.pi * (radius / spacing) ** 3
-    gradient = 180 * fluid.case.fluid.viscosity_Pa_s * solid**2 * row["velocity_m_s"]
+    forces = fluid.forces(bed, FIRST)
+    row, viscosity = forces.measures, fluid.case.fluid.viscosity_Pa_s
+    solid = np.pi / 6
+    gradient = 180 * viscosity * solid**2 * row["velocity_m_s"]
     gradient /= (1 - solid) ** 3 * (2 * radius) ** 2
     assert row["pressure_cake_Pa"] == pytest.approx(gradient * 16 * spacing, rel=0.15)
-    assert row["cake_thickness_m"] == pytest.approx(16 * spacing, rel=0.1)
+    assert row["cake_thickness_m"] == pytest.approx(16 * spacing, rel=1e-9)
+    summary = cake_summary(measure_cake(bed, fluid.case.periodic), 1.0)["cake"]
+    pressure = summary["resistance_1_m"] * viscosity * row["velocity_m_s"]
+    assert row["pressure_cake_Pa"] == pytest.approx(pressure, rel=1e-9)
+    assert summary["thickness_m"] == pytest.approx(row["cake_thickness_m"], rel=1e-9)
+    on_cake = (forces.coefficient * forces.velocity[:, 0])[place[:, 0] < 0].sum()
+    area = fluid.pack.network.area
+    assert on_cake == pytest.approx(row["pressure_cake_Pa"] * area, rel=1e-9)
 
 
 def test_fines_that_move_with_the_mud_make_no_cake_and_feel_no_force(fluid):
