@@ -251,6 +251,23 @@ def test_a_continued_invasion_in_the_network_s_field_is_the_uncut_one(
     assert differences(case, grains_of(case), tmp_path, binary) == []
 
 
+def test_springs_that_grow_with_the_load_keep_overlaps_small_and_go_on_bit_for_bit(
+    go, binary, grains_of, tmp_path
+):
+    case = followed(*SLOWER, "run.stiffness_N_m=auto", way="fluid.darcy_length_mm=8.0")
+    whole = go(case, tmp_path / "alone")
+    steps = np.diff([0, *(row.step for row in whole.history)])
+    assert steps[-1] > steps[0], "no spring was stiffened"
+    assert 0.01 < whole.max_overlap < 0.03
+    times = [row["time_s"] for row in whole.updates]
+    scales = scales_of(case)
+    chunk = scales.checkpoint_steps * scales.time_step
+    assert [one / chunk for one in times if round(one / chunk, 9) % 1 == 0] == pytest.approx(
+        range(len(steps))
+    )
+    assert differences(case, grains_of(case), tmp_path, binary) == []
+
+
 @pytest.mark.nightly
 def test_a_continued_coupled_invasion_is_the_uncut_one_everywhere(binary, grains_of, tmp_path):
     for ranks in (1, 2):

@@ -10,13 +10,14 @@ from scipy.integrate import quad
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case, set_keys
-from fdnet.dem.checkpoint import chunks_of
+from fdnet.dem.checkpoint import chunks_of, steps_after
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
+from fdnet.scales.clock import STARTING, deposit_pressure, slab_of
 from fdnet.scales.contacts import series
-from fdnet.scales.flow import Losses, carman_kozeny, radial, straight
-from fdnet.scales.scales import InvasionScales, scales_of
+from fdnet.scales.flow import Losses, carman_kozeny, radial, straight, velocity_of
+from fdnet.scales.scales import InvasionScales, invasion_scales, scales_of, stiffened
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Array, Kind
 
@@ -74,8 +75,62 @@ def test_stiffness_auto_is_the_least_that_keeps_overlaps_small():
             stiffness = max(c.normal_stiffness for c in auto.contacts.values())
             chosen = stiffness if model == "hooke" else number
             same = scales_of(tiny(*keys, f"run.stiffness_N_m={chosen!r}"))
-            assert same.deposit_overlap == pytest.approx(auto.deposit_overlap, rel=1e-9)
+            held = 2 / 3 if model == "hertz" else 1.0
+            start = auto.deposit_overlap / STARTING**held
+            assert same.deposit_overlap == pytest.approx(start, rel=1e-9)
             assert not any("overlap" in warning for warning in auto.warnings)
+
+
+def test_a_deposit_bears_its_share_of_the_way():
+    """In series: 3 mm of sand and what comes on a way of 100 mm, at constant pressure or rate."""
+    keys = (*FOLLOWED, "fluid.overbalance_MPa=2.0", "fluid.darcy_length_mm=100.0")
+    case = tiny(*keys, "drag.scheme=implicit")
+    porosity, length, way = 0.4, 3e-3, 0.1
+    flow = velocity_of(case, porosity)
+    bed = 1e-4**2 * 0.36**3 / (180 * 0.64**2)  # m2, of fines of 0.1 mm
+    solids = 100 * math.pi / 6 * 1e-12 / (1.6e-3) ** 2  # m3 a m2 of face
+    fines = flow.permeability * solids / 0.64 / bed
+    whole = 2e6 * (length + fines) / (way + fines)
+
+    def borne(*more: str) -> float:
+        return deposit_pressure(tiny(*keys, "drag.scheme=implicit", *more), flow, porosity)
+
+    assert borne() == pytest.approx(whole, rel=1e-9)
+    rate = 2e6 * (length + fines) / way
+    assert borne("drag.drive=rate") == pytest.approx(rate, rel=1e-9)
+    # a tenth of the slab is fed; the rate may fall by 1 %
+    some = 0.1 * fines
+    feeding = 0.1 * slab_of(case).length / flow.darcy
+    fed = 2e6 * (length + some) / (way + some)
+    assert borne(f"run.duration_ms={1e3 * feeding!r}") == pytest.approx(fed, rel=1e-9)
+    volumes = 0.1 * slab_of(case).length / (porosity * length)
+    assert borne(f"run.stop_pore_volumes={volumes!r}") == pytest.approx(fed, rel=1e-9)
+    slower = 2e6 * (length + way * (1 / 0.999 - 1)) / (way / 0.999)
+    assert borne("run.stop_rate=0.999") == pytest.approx(slower, rel=1e-9)
+    assert deposit_pressure(tiny(*FOLLOWED), velocity_of(tiny(), porosity), porosity) <= 3.5e6
+
+
+def test_springs_grow_with_the_square_of_the_steps_of_a_chunk():
+    case = tiny(*FOLLOWED, "drag.scheme=implicit", "run.stiffness_N_m=auto")
+    scales = invasion_scales(case)
+    usual = scales.checkpoint_steps
+    assert steps_after(case, scales, usual, 0.02) == usual
+    assert steps_after(case, scales, usual, 0.03) == math.ceil(usual * math.sqrt(2))
+    assert steps_after(case, scales, usual, 0.9) == 2 * usual
+    assert stiffened(case, scales, usual) is scales
+    more = stiffened(case, scales, 2 * usual)
+    assert more.checkpoint_steps * more.time_step == pytest.approx(
+        usual * scales.time_step, rel=1e-12
+    )
+    for name, contact in more.contacts.items():
+        before = scales.contacts[name]
+        assert contact.normal_stiffness == pytest.approx(4 * before.normal_stiffness, rel=1e-12)
+        assert contact.shear_stiffness == pytest.approx(4 * before.shear_stiffness, rel=1e-12)
+        assert more.time_step / contact.step_limit == pytest.approx(
+            scales.time_step / before.step_limit, rel=1e-12
+        )
+    given = tiny(*FOLLOWED, "run.stiffness_N_m=100000")
+    assert steps_after(given, scales, usual, 0.9) == usual
 
 
 def test_one_seed_has_one_pack_whatever_stiffness_the_invasion_takes():
