@@ -251,6 +251,7 @@ def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
     number = math.ceil(scales.slab_length / length - 1e-9)
     share = np.minimum(np.arange(1, number + 1) * length / scales.slab_length, 1.0)
     counts = np.diff(np.round(share * scales.supplied_count).astype(int), prepend=0)
+    counts = counts[counts > 0] if case.fines.endless else counts
     if not counts.all():
         return whole
     return Batches(counts=tuple(int(count) for count in counts), length=length, travel=travel)

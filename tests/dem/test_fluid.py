@@ -9,6 +9,7 @@ import pytest
 from builders import followed, resting_spheres
 
 from fdnet.case.file import case_from
+from fdnet.dem.checkpoint import quiet_chunks
 from fdnet.dem.deck import snapshot_of, specimen_box, write_data
 from fdnet.dem.invade_deck import (
     FluidForces,
@@ -313,6 +314,26 @@ def test_a_rate_or_a_volume_that_is_asked_for_ends_the_run(go, fluid, done, tmp_
     rows, history = results["duration"].updates, results["duration"].history
     before = [row for row in rows if row["step"] < history[-2].step]
     assert before[-1]["filtrate_m3"] < asked * pores <= rows[-1]["filtrate_m3"]
+
+
+def test_a_face_is_plugged_once_all_that_moves_has_come_to_rest(go, fluid, tmp_path):
+    """The face alone was quiet before, while a fine left and others moved inside."""
+    other = with_case(
+        fluid,
+        "fines={radius_mm=[0.03,0.11], friction=0.0, count=150, concentration=0.2, "
+        "supply='slab'}",
+        *("run.plug_time_ms=0.06", "run.checkpoint_ms=0.02", "run.cap_ms=2.0"),
+    )
+    result, chunks = go(other, tmp_path), quiet_chunks(other.scales)
+    entered = [row.invaded + row.passed for row in result.history]
+    crossed = [row.invaded + 2 * row.passed for row in result.history]
+    assert result.stop_reason == "plugged"
+    assert crossed[-1] == crossed[-1 - chunks]
+    assert any(one == two for one, two in zip(entered, entered[chunks:-1], strict=False))
+    spheres = result.damaged.fines()
+    inside = (spheres.position[:, 0] >= 0) & (spheres.position[:, 0] < other.case.size_m[0])
+    mean = spheres.velocity[inside, 0].mean() / other.scales.interstitial_velocity
+    assert 0 < mean <= 0.01
 
 
 def test_a_slab_at_constant_rate_raises_the_pressure(go, fluid, tmp_path):

@@ -16,6 +16,7 @@ from cut_and_continue import MATRIX, cell_case, differences
 from fdnet.dem.checkpoint import UPDATES, Checkpoints, file_digest, read_history, read_updates
 from fdnet.dem.invasion import invade, steps_between
 from fdnet.dem.liggghts import Launch, run_deck
+from fdnet.dem.supply import batches_of
 from fdnet.errors import CaseError, LiggghtsError
 from fdnet.run.fluid import fluid_of
 from fdnet.scales.scales import scales_of
@@ -45,6 +46,16 @@ def test_a_continued_invasion_is_the_uncut_one(binary, grains_of, tmp_path, cell
     case = cell_case(*cell, *QUICK[cell])
     assert differences(case, grains_of(case), tmp_path, binary) == []
     assert not list(tmp_path.glob("*/post/*contacts*")), "the scratch file stays"
+
+
+ENDLESS = "fines={radius_mm=0.05, concentration=0.1}"
+
+
+def test_a_continued_invasion_by_mud_without_an_end_is_the_uncut_one(binary, grains_of, tmp_path):
+    """It stops by its cap and would take in more mud."""
+    case = cell_case("periodic", "fixed", "batches", "implicit", ENDLESS)
+    assert len(batches_of(case, scales_of(case)).counts) > 10
+    assert differences(case, grains_of(case), tmp_path, binary) == []
 
 
 @pytest.mark.nightly
@@ -242,11 +253,11 @@ def test_a_continued_coupled_invasion_is_the_uncut_one(binary, grains_of, tmp_pa
     assert differences(case, grains_of(case), tmp_path, binary) == []
 
 
-@pytest.mark.parametrize("keys", [(), SLOWER])
+@pytest.mark.parametrize("keys", [(), SLOWER, (ENDLESS, *SLOWER[2:])])
 def test_a_continued_invasion_in_the_network_s_field_is_the_uncut_one(
     binary, grains_of, tmp_path, keys
 ):
-    """With a slab, and with batches that come as the mud slows down."""
+    """With a slab, and with batches that come as the mud slows down, some or without an end."""
     case = followed(*keys)
     assert differences(case, grains_of(case), tmp_path, binary) == []
 
