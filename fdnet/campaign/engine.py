@@ -5,6 +5,7 @@ Each run is `fdnet run --resume` in a process of its own, which goes on where it
 
 import contextlib
 import ctypes
+import itertools
 import json
 import os
 import re
@@ -33,16 +34,11 @@ ENGINES = ("local", "snakemake", "slurm")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HowToRun:
-    """How runs are carried out, as opposed to what they are.
+    """How runs are carried out: `jobs` at the same time, each stopped after `timeout` seconds.
 
-    Attributes:
-        jobs: how many at the same time.
-        liggghts: path of the binary; None: looked for.
-        launcher: template that starts several ranks; None: mpirun.
-        timeout: s, after which LIGGGHTS of one run is stopped; None: never.
-        engine: "local", "snakemake", or "slurm" (Snakemake with its executor for Slurm).
-        resources: of Snakemake for Slurm, as ("slurm_partition=short", "runtime=60").
-        quiet: whether to show no progress.
+    The engine is "local", "snakemake" or "slurm" (Snakemake with its executor for Slurm, which
+    gets `resources`, as "slurm_partition=short"). Where `liggghts` is None it is looked for, and
+    the launcher of several ranks is mpirun. `quiet` shows no progress.
     """
 
     jobs: int
@@ -84,14 +80,12 @@ class Task(NamedTuple):
 
 
 Ended = Callable[[str, int], None]
-"""Gets the name and the exit code of a task that has ended."""
 
 
 def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
     """Carry out what is missing of the plan; `lock` is the descriptor of the folder's lock.
 
-    A run that fails stops no other. Raises CaseError when the disk is full, when Snakemake is not
-    installed, and when it did not begin.
+    A run that fails stops no other. Raises CaseError for a full disk and for a missing Snakemake.
     """
     tasks = _tasks_of(path, plan, how)
     if not tasks:
@@ -106,13 +100,11 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
     how.say(f"{len(plan.jobs)} runs, {missing} of them to do")
     for task in tasks:
         _log(path, task.name).unlink(missing_ok=True)
-    count = 0
+    numbers = itertools.count(1)
 
     def ended(name: str, code: int) -> None:
-        nonlocal count
-        count += 1
         word = f"FAILED (exit code {code})" if code else "done"
-        how.say(f"{count} of {len(tasks)}: {name} {word}")
+        how.say(f"{next(numbers)} of {len(tasks)}: {name} {word}")
 
     if how.engine == "local":
         _run_pool(path, tasks, how.jobs, ended)
@@ -121,13 +113,17 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
 
 
 def _tasks_of(path: Path, plan: Plan, how: HowToRun) -> list[Task]:
-    """What is missing in the folder: packs that several runs share, and runs that are not done.
+    """Packs that several runs share, and runs that are not done.
 
-    A run whose files were changed is asked again, and `fdnet run` says so in its log.
+    A finished run whose files were changed is no task: it is named, and its files stay.
     """
     shared, packs, runs = plan.packs, dict[str, Task](), []
     for job in plan.jobs:
-        if state_of(path, plan, job).status == "done":
+        status, reason = state_of(path, plan, job)
+        changed = status == "failed" and (path / RUNS / job.name / MANIFEST).exists()
+        if changed:
+            how.say(f"{job.name} is left as it is: {reason}")
+        if changed or status == "done":
             continue
         start = [sys.executable, "-m", "fdnet.cli", "run", f"{CASES}/{job.name}.toml"]
         start += ["--resume", "--quiet", "--np", str(plan.ranks), *how.options]
@@ -182,14 +178,11 @@ def _stop(
             process.wait()
 
 
-# ------------------------------------------------------------------------------------------------
-# The pool: some processes at a time on this machine, nothing else needed.
-
-
+# ---- The pool: some processes at a time on this machine, nothing else needed.
 def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> None:
-    """Run the tasks, `jobs` at a time. One that fails stops only those that need what it makes.
+    """Run the tasks, `jobs` at a time; an exception stops the running ones in good order.
 
-    When this is left by an exception, the running ones are stopped in good order.
+    One that fails stops only those that need what it makes.
     """
     waiting, running, full = list(tasks), dict[str, subprocess.Popen](), False
     failed: set[str] = set()
@@ -231,10 +224,7 @@ def _end_with_parent() -> None:
     ctypes.CDLL(None).prctl(1, signal.SIGTERM, 0, 0, 0)
 
 
-# ------------------------------------------------------------------------------------------------
-# Snakemake, with the static Snakefile that comes with fdnet.
-
-
+# ---- Snakemake, with the static Snakefile that comes with fdnet.
 SNAKEFILE = str(resources.files("fdnet.campaign").joinpath("Snakefile"))
 _CONFIG = f"{LOGS}/snakemake.json"
 _REASON = re.compile(
@@ -307,8 +297,5 @@ def _quoted(resource: str) -> str:
     """
     name, _, value = resource.partition("=")
     if not name.isidentifier() or not value.isprintable() or not value:
-        raise CaseError(
-            f"--slurm: {resource!r}, expected resources of Snakemake as slurm_partition=short,"
-            "runtime=60"
-        )
+        raise CaseError(f"--slurm: {resource!r}, expected e.g. slurm_partition=short,runtime=60")
     return resource if value.isdecimal() else f"{name}={value.strip(chr(39) + chr(34))!r}"

@@ -146,8 +146,11 @@ def test_multigrid_solves_pores_without_neighbours():
 def test_direct_takes_over_where_multigrid_fails_and_what_neither_can_solve_is_refused(
     monkeypatch,
 ):
-    with pytest.raises(FlowError, match="no way out"):
-        Balances(np.zeros((0, 2), int), np.zeros(0), np.zeros(3)).solve(np.ones(3))
+    chain = np.array([[0, 1], [1, 2]])
+    for pair, most in ((chain[:0], 3), (chain[:0], 0), (chain, 0)):
+        closed = Balances(pair, np.ones(len(pair)), np.zeros(3), direct_up_to=most)
+        with pytest.raises(FlowError, match="3 pores failed: .*no way out"):
+            closed.solve(np.ones(3))
     pair, g, tied, source = links()
     expected = Balances(pair, g, tied).solve(source)
     monkeypatch.setattr(solver, "DIRECT_UP_TO", 0)
