@@ -48,13 +48,6 @@ def ensemble(
     Raises:
         CaseError: the case, the folder or an option cannot be used.
         LiggghtsError: LIGGGHTS is missing. A run that fails is named in `summary["failures"]`.
-
-    Examples:
-        >>> import fdnet
-        >>> fdnet.ensemble("cases/quick.toml", seeds=0, out="runs/none")
-        Traceback (most recent call last):
-            ...
-        fdnet.errors.CaseError: seeds: 0, expected 1 or more, ...
     """
     given = case if isinstance(case, Case) else read_case(case)
     return _carried_out(partial(plans.ensemble_plan, given, seeds), out, until, max_seeds, **how)

@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
@@ -186,6 +187,8 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> Non
     """
     waiting, running, full = list(tasks), dict[str, subprocess.Popen](), False
     failed: set[str] = set()
+    # The kernel sends SIGTERM when the parent dies, however it dies (PR_SET_PDEATHSIG).
+    dies_with_parent = partial(ctypes.CDLL(None).prctl, 1, signal.SIGTERM, 0, 0, 0)
     try:
         while running or (waiting and not full):
             full = full or disk_is_full(path)
@@ -196,17 +199,14 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> Non
             ready = [task for task in waiting if task.after not in not_ended]
             for task in [] if full else ready[: jobs - len(running)]:
                 waiting.remove(task)
-                running[task.name] = _start(
-                    task.words, path, _log(path, task.name), preexec_fn=_end_with_parent
-                )
+                log = _log(path, task.name)
+                running[task.name] = _start(task.words, path, log, preexec_fn=dies_with_parent)
             for name in [name for name, process in running.items() if process.poll() is not None]:
                 code = running.pop(name).returncode
                 if code < 0:  # it could not write its reason itself
-                    with _log(path, name).open("a", encoding="utf-8") as log:
-                        log.write(
-                            f"\nfdnet: ended by signal {-code} ({signal.Signals(-code).name}), "
-                            "perhaps for want of memory; repeat the command to go on\n"
-                        )
+                    why = f"ended by signal {-code} ({signal.Signals(-code).name}), perhaps for "
+                    with _log(path, name).open("a", encoding="utf-8") as file:
+                        file.write(f"\nfdnet: {why}want of memory; repeat the command to go on\n")
                 failed |= {name} if code else set()
                 ended(name, code)
             time.sleep(PAUSE)
@@ -217,11 +217,6 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> Non
             f"{path}: the disk is full; {len(waiting)} jobs were not started: free space, then "
             "repeat the command, which runs only what is missing"
         )
-
-
-def _end_with_parent() -> None:
-    """Ask the kernel for a SIGTERM when the parent dies, however it dies (PR_SET_PDEATHSIG)."""
-    ctypes.CDLL(None).prctl(1, signal.SIGTERM, 0, 0, 0)
 
 
 # ---- Snakemake, with the static Snakefile that comes with fdnet.

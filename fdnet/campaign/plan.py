@@ -262,10 +262,8 @@ class _PlanRecord(JsonObject):
 
 def read_plan_record(folder: Path) -> dict[str, Any] | None:
     """plan.json of a folder, None where there is none. Raises CaseError where it is no plan."""
-    path = folder / PLAN
-    if not path.exists():
-        return None
-    return read_json(path, _PlanRecord, noun="plan of this fdnet", advice="give another folder")
+    path, words = folder / PLAN, {"noun": "plan of this fdnet", "advice": "give another folder"}
+    return read_json(path, _PlanRecord, **words) if path.exists() else None
 
 
 def kept_plan(folder: Path) -> Plan | None:

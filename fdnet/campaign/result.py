@@ -286,10 +286,6 @@ def _variant_names(cases: Sequence[str], varied: Sequence[Mapping[str, Any]]) ->
 
 
 # ---- table.csv and summary.json.
-def _relative(comparison: Comparison, entry: Entry) -> str:
-    return os.path.relpath(entry.folder, comparison.path)
-
-
 def write_table(comparison: Comparison) -> None:
     """Write table.csv: a row for each run, with every number of its summary by dotted key, SI."""
     import pandas as pd
@@ -298,21 +294,21 @@ def write_table(comparison: Comparison) -> None:
         {
             "run": entry.name,
             "variant": entry.variant,
-            **{key: _plain(entry.keys.get(key)) for key in comparison.keys},
+            **dict.fromkeys(comparison.keys),
+            **{
+                k: json.dumps(v) if isinstance(v, list | Mapping) else v
+                for k, v in entry.keys.items()
+            },
             "seed": entry.seed,
             "status": entry.status,
             "reason": entry.reason,
-            "folder": _relative(comparison, entry),
+            "folder": os.path.relpath(entry.folder, comparison.path),
             **entry.numbers,
         }
         for entry in comparison.entries
     ]
     with replacing(comparison.path / TABLE) as part:
         pd.DataFrame(rows, dtype=object).to_csv(part, index=False, lineterminator="\n")
-
-
-def _plain(value: Any) -> Any:
-    return value if value is None or isinstance(value, int | float | str) else json.dumps(value)
 
 
 def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
@@ -322,7 +318,7 @@ def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, 
     """
     failures = [
         {"run": one.name, "status": one.status, "reason": one.reason}
-        | {"folder": _relative(comparison, one)}
+        | {"folder": os.path.relpath(one.folder, comparison.path)}
         for one in comparison.failed
     ]
     result: dict[str, Any] = {

@@ -104,17 +104,6 @@ def test_bad_sweeps_are_refused_with_the_key(write):
     assert not (write("").parent / "out").exists()
 
 
-def test_a_judge_is_kept_with_the_plan(write):
-    """Its table stands in plan.json and decides nothing about what is run."""
-    judge = {"reference": {"fines.count": 40}, "quantities": ["k_reduction", "skin"]}
-    text = 'case = "tiny.toml"\n[grid]\nfines.count = [40, 80]\n'
-    plain, _ = planned(write(text))
-    plan, _ = planned(write(f"{text}{tomli_w.dumps({'judge': judge})}"))
-    assert plain["judge"] == {}
-    assert plan["judge"] == judge
-    assert plan["digest"] == plain["digest"]
-
-
 def test_a_million_runs_are_refused_with_their_number(write, capsys):
     values = list(range(1, 1001))
     path = write(f'case = "tiny.toml"\nseeds = 1000\n[grid]\nfines.count = {values}')
