@@ -4,6 +4,7 @@ Each message names what is wrong, where, what was expected and what to do.
 """
 
 import errno
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
@@ -165,6 +166,10 @@ def words_of(error: Exception) -> str:
 
 
 PAGE = "docs/reference/warnings.md"
+MIDDLE = 25
+"""Rank of a warning that has no kind, among those by importance."""
+SHOWN = 3
+"""Most warnings on the first screen; the others are in the report and the summary."""
 
 
 class Doubt(str):
@@ -225,6 +230,17 @@ def explained(warning: str) -> str:
         if name not in entry.says
     ]
     return "; ".join([warning.rstrip("."), *missing]) + f" (see {PAGE}#{entry.key})"
+
+
+def by_importance(sentences: Iterable[str]) -> list[str]:
+    """Explained warnings, each once, in the order of their kinds; others keep the middle."""
+    order = {key: rank for rank, key in enumerate(catalogue())}
+
+    def rank(sentence: str) -> float:
+        _, found, key = sentence.rpartition(f" (see {PAGE}#")
+        return order.get(key.rstrip(")"), MIDDLE) if found else MIDDLE
+
+    return sorted(dict.fromkeys(sentences), key=rank)
 
 
 def page() -> str:

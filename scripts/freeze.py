@@ -24,12 +24,14 @@ from validation.truth import read_pack, slabs
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "tests/data/frozen.json"
-FOLLOWED = ["field=network", "upstream=darcy", "crowd=beetstra", "pressure_gradient=true"]
 RUNS = {
     "quick": ["cases/quick.toml"],
-    "followed": ["cases/quick/specimen5.toml", "--set", "drag.scheme=implicit"]
-    + [part for key in FOLLOWED for part in ("--set", f"drag.{key}")]
-    + [*("--set", "analysis.law=lubrication", "--set", "analysis.damage_law=auto")],
+    "followed": [
+        "cases/quick/specimen5.toml",
+        "--set",
+        'drag={field="network"}',
+        *("--set", "analysis.law=lubrication", "--set", "analysis.damage_law=auto"),
+    ],
     "cleaned": ["cases/quick/specimen5.toml", "--set", "clean_up.drawdown_MPa=0.7"],
 }
 SMALL = ["--set", "fines.count=400", "--set", "run.cap_ms=20"]

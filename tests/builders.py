@@ -16,8 +16,16 @@ TINY: dict[str, Any] = {
     "box": {"size_mm": [3.0, 1.6, 1.6], "sides": "walls", "wall_friction": 0.0},
     "grains": {"radius_mm": 0.25, "count": 66},
     "fines": {"radius_mm": 0.05, "count": 300, "supply": "slab"},
-    "drag": {"upstream": "interstitial", "pressure_gradient": False},
-    "run": {"time_step_factor": 0.1},
+    "fluid": {"darcy_law": "darcy"},
+    "drag": {
+        "field": "uniform",
+        "inertia": "none",
+        "scheme": "held",
+        "upstream": "interstitial",
+        "pressure_gradient": False,
+    },
+    "contact": {"restitution": "dry"},
+    "run": {"time_step_factor": 0.1, "stiffness_N_m": 1e4},
     "analysis": {"sections": 3},
 }
 
@@ -47,10 +55,7 @@ def resting_spheres(
 def followed(*more, way="fluid.velocity_m_s=5.0"):
     """A flow that follows its deposit: 15 grains, 150 fines, five checkpoints with updates."""
     return tiny(
-        "drag.field=network",
-        "drag.crowd=beetstra",
-        "drag.scheme=implicit",
-        "drag.upstream=darcy",
+        'drag={field = "network"}',
         way,
         "run.time_step_factor=0.2",
         "box.sides=periodic",

@@ -140,7 +140,7 @@ def test_what_check_finds_stands_in_summary_and_report(finished):
     odd = [one.sentence for one in checked(case, scales_of(case)).findings]
     assert odd[0].startswith("box.size_mm: the specimen is 3.2 mean grains wide")
     warnings = finished.summary["warnings"]
-    assert warnings[: len(odd)] == odd
+    assert set(odd) <= set(warnings)
     report = (finished.path / "report.html").read_text(encoding="utf-8")
     assert "the specimen is 3.2 mean grains wide" in report
 

@@ -8,6 +8,7 @@ from builders import naming
 
 from fdnet.case.file import first_sentence, read_case
 from fdnet.cli import main
+from fdnet.scales.clock import PLUG_SOLIDS
 from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
 
@@ -45,12 +46,19 @@ def test_the_case_of_a_sand_and_a_mud_is_sized_by_them(median, tmp_path, capsys)
     assert case.fines.curve.kept > 0.5
     assert max(scales.impact_overlap, scales.drag_overlap) <= case.run.max_overlap
     assert cost.seconds <= 1.05 * 600
-    longest = max(cost.duration, scales.slab_length / scales.upstream_velocity)
+    assert case.fines.endless == (median == 100), "only mud that takes too long is cut short"
+    slab = case.fines.slab_m or PLUG_SOLIDS * case.grains.curve.size_at(0.5) / (
+        case.fines.placed_fraction
+    )
+    longest = max(cost.duration, slab / scales.upstream_velocity)
     assert case.run.cap_s == pytest.approx(1.5 * longest * scales.force_factor, rel=0.15)
     assert case.fines.sizes.D10_mm == pytest.approx(5e-4 * median)
     assert case.well.radius_mm == 108.0
     text = out.read_text()
-    assert f"{100 * case.fines.curve.below:.0f} % of the solids" in text
+    assert "drainage_radius" not in text
+    assert case.well.drainage_radius_m == 100.0
+    share = f"{100 * case.fines.curve.below:.0f} % of the solids are finer"
+    assert (share in text) == (case.fines.cut_um is not None)
     assert "assumed" in text
     assert max(map(len, text.splitlines())) <= 99
 

@@ -148,10 +148,7 @@ def test_what_the_answer_rests_on_is_in_it(tmp_path, answer, numbers):
     assert any("damage law is fdnet's default" in text for text in default["assumptions"])
 
 
-# ------------------------------------------------------------------------------------------------
-# Unit cells, and spheres inside others.
-
-
+# ---- Unit cells, and spheres inside others.
 @pytest.mark.parametrize(
     ("places", "radius", "height", "k", "error"),
     [

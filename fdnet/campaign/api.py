@@ -1,34 +1,17 @@
 """Ensembles, sweeps and comparisons: run what is missing, gather, add seeds until it is enough."""
 
-import contextlib
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from fdnet.campaign import plan as plans
+from fdnet.campaign import result as results
 from fdnet.campaign.engine import HowToRun, run_missing
-from fdnet.campaign.page import pair_lines, ranking_lines, write_comparison
-from fdnet.campaign.plan import (
-    MOST_JOBS,
-    RUNS,
-    Plan,
-    campaign_folder,
-    ensemble_plan,
-    extended,
-    kept_plan,
-    sweep_plan,
-)
-from fdnet.campaign.result import (
-    RANKED_BY,
-    SHARES,
-    TABLE,
-    Comparison,
-    gather_plan,
-    gather_runs,
-    make_result_folder,
-    refuse_unknown,
-)
+from fdnet.campaign.page import Compared, write_comparison
+from fdnet.campaign.plan import Plan
+from fdnet.campaign.result import RANKED_BY, Comparison
 from fdnet.case.case import Case
 from fdnet.case.file import read_case
 from fdnet.errors import CaseError, FdnetError
@@ -37,37 +20,6 @@ from fdnet.names import STAGES
 from fdnet.run.pipeline import refuse
 from fdnet.run.records import RunOptions, cores
 from fdnet.statistics.bands import seeds_for_width, student_band
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Compared:
-    """Runs and what they say together. It prints its ranking.
-
-    Attributes:
-        path: folder with table.csv, summary.json and compare.html.
-        summary: what summary.json holds: `runs`, `failed`, and by quantity `mean`, `low`, `high`.
-        ranking: one sentence for each variant.
-        differences: one sentence for each two variants.
-    """
-
-    path: Path
-    summary: Mapping[str, Any]
-    ranking: tuple[str, ...]
-    differences: tuple[str, ...]
-
-    @property
-    def table(self) -> "pd.DataFrame":
-        """table.csv: one row for each run, lengths in m and permeabilities in m2."""
-        from fdnet.report.tables import read_table
-
-        return read_table(self.path / TABLE, ("run", "variant", "seed", "status"), texts=None)
-
-    def __str__(self) -> str:
-        """The ranking and the differences."""
-        return "\n".join([*self.ranking, *self.differences])
 
 
 def ensemble(
@@ -96,17 +48,9 @@ def ensemble(
     Raises:
         CaseError: the case, the folder or an option cannot be used.
         LiggghtsError: LIGGGHTS is missing. A run that fails is named in `summary["failures"]`.
-
-    Examples:
-        >>> import fdnet
-        >>> fdnet.ensemble("cases/quick.toml", seeds=0, out="runs/none")
-        Traceback (most recent call last):
-            ...
-        fdnet.errors.CaseError: seeds: 0, expected 1 or more, ...
     """
     given = case if isinstance(case, Case) else read_case(case)
-    plan = ensemble_plan(given, seeds, **_of_plan(how))
-    return _carried_out(expanded(out), plan, until, max_seeds, **how)
+    return _carried_out(partial(plans.ensemble_plan, given, seeds), out, until, max_seeds, **how)
 
 
 def sweep(
@@ -120,16 +64,8 @@ def sweep(
     """Run every combination of the sweep file at `path`, and compare the variants.
 
     The other arguments, results (in SI: m, m2) and errors are those of `ensemble`.
-
-    Examples:
-        >>> import fdnet
-        >>> fdnet.sweep("no-such-sweep.toml", out="runs/none")
-        Traceback (most recent call last):
-            ...
-        fdnet.errors.CaseError: no-such-sweep.toml: cannot be read as a sweep file: ...
     """
-    plan = sweep_plan(path, **_of_plan(how))
-    return _carried_out(expanded(out), plan, until, max_seeds, **how)
+    return _carried_out(partial(plans.sweep_plan, path), out, until, max_seeds, **how)
 
 
 def compare_runs(
@@ -140,71 +76,48 @@ def compare_runs(
     The folder of a campaign stands for all its finished runs; where `out` is this folder, its
     own results are written anew. Lengths are in m and permeabilities in m2. Raises CaseError for
     a folder without a finished run, and for a run that would be counted twice.
-
-    Examples:
-        >>> import fdnet
-        >>> fdnet.compare_runs(["no/such/run"], out="runs/compared")
-        Traceback (most recent call last):
-            ...
-        fdnet.errors.CaseError: no/such/run: does not exist; ...
     """
-    return _compared(gathered([expanded(run) for run in runs], expanded(out), ranked_by))
+    return write_comparison(gathered([expanded(run) for run in runs], expanded(out), ranked_by))
 
 
 def gathered(runs: Sequence[Path], out: Path, ranked_by: str) -> Comparison:
     """The comparison of run folders, with the folder of its results made."""
-    own = kept_plan(out) if [one.resolve() for one in runs] == [out.resolve()] else None
+    own = plans.kept_plan(out) if [one.resolve() for one in runs] == [out.resolve()] else None
     if own is not None:
-        comparison = gather_plan(out, own, ranked_by=ranked_by)
-    else:
-        comparison = gather_runs(runs, out, ranked_by=ranked_by)
-    refuse_unknown(comparison, ranked_by, "--rank-by")
-    if own is None:
-        make_result_folder(out)
+        return results.gather_plan(out, own, ranked_by=ranked_by)
+    comparison = results.gather_runs(runs, out, ranked_by=ranked_by)
+    plans.refuse_foreign(out, (results.TABLE, results.SUMMARY, results.PAGE), "comparison")
+    out.mkdir(parents=True, exist_ok=True)
     return comparison
 
 
-def _of_plan(how: dict[str, Any]) -> dict[str, Any]:
-    """Takes what belongs to the plan out of `how`."""
-    stages = tuple(how.pop("stages", STAGES))
-    limit, ranks = how.pop("jobs_limit", MOST_JOBS), how.pop("ranks", 1)
-    return {"limit": limit, "ranks": ranks, "stages": stages}
-
-
 def _carried_out(
-    path: Path,
-    plan: Plan,
+    plan_of: Callable[..., Plan],
+    out: str | Path,
     until: str | None,
     max_seeds: int,
     *,
     ranked_by: str = RANKED_BY,
     jobs: int | None = None,
+    ranks: int = 1,
+    stages: Sequence[str] = STAGES,
+    jobs_limit: int = plans.MOST_JOBS,
     progress: bool = False,
     **how: Any,
 ) -> Compared:
+    plan = plan_of(limit=jobs_limit, ranks=ranks, stages=tuple(stages))
     running = HowToRun(
-        jobs=max(1, cores() // plan.ranks) if jobs is None else jobs, quiet=not progress, **how
+        jobs=max(1, cores() // ranks) if jobs is None else jobs, quiet=not progress, **how
     )
-    goal = None if until is None else parse_until(until)
-    return _compared(carry_out(path, plan, running, goal, ranked_by, most_seeds=max_seeds))
-
-
-def _compared(comparison: Comparison) -> Compared:
-    return Compared(
-        path=comparison.path,
-        summary=write_comparison(comparison, {}),
-        ranking=tuple(ranking_lines(comparison)),
-        differences=tuple(pair_lines(comparison)),
+    return write_comparison(
+        carry_out(expanded(out), plan, running, until, ranked_by, most_seeds=max_seeds)
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# From a plan to its comparison.
-
-
+# ---- From a plan to its comparison.
 FEWEST = 3
 """Seeds before a band is believed."""
-_UNTIL = re.compile(r"\s*([\w.]+)\s*(?:±|\+-|\+/-)\s*([0-9.eE+-]+)\s*(%?)\s*")
+_UNTIL = re.compile(r"\s*([\w.]+)\s*(?:±|\+-|\+/-)\s*(\d*\.?\d+(?:[eE][+-]?\d+)?)\s*(%?)\s*")
 
 
 class Until(NamedTuple):
@@ -221,24 +134,19 @@ class Until(NamedTuple):
 
 
 def parse_until(text: str) -> Until:
-    """The goal that `--until` gives.
+    """The goal that `--until` gives. Raises CaseError for anything else.
 
     Percent of a share (k_reduction, a porosity) are points: 45 % ± 5 % is 40 to 50 %. Percent of
     any other quantity are of its mean. Without percent the number has the quantity's unit.
-
-    Raises CaseError for anything else.
     """
     match = _UNTIL.fullmatch(text)
-    width = 0.0
-    with contextlib.suppress(ValueError):
-        width = float(match[2]) if match else 0.0
-    if match is None or not 0 < width < float("inf"):
+    if match is None or not 0 < (width := float(match[2])) < float("inf"):
         raise CaseError(
             f"--until {text!r}: expected a quantity and the half of its band, e.g. "
             "'k_reduction ± 5 %' or 'k_damaged_m2 +- 10 %'"
         )
     percent = match[3] == "%"
-    relative = percent and SHARES.search(match[1]) is None
+    relative = percent and results.SHARES.search(match[1]) is None
     return Until(match[1], width / 100 if percent else width, relative)
 
 
@@ -246,7 +154,7 @@ def carry_out(
     path: Path,
     plan: Plan,
     how: HowToRun,
-    until: Until | None,
+    until: str | None,
     ranked_by: str,
     *,
     most_seeds: int = 32,
@@ -255,54 +163,44 @@ def carry_out(
     """Run what is missing of the plan in the folder `path`; returns the comparison.
 
     With `until`, seeds are added, at most `most_seeds`. Without `run` it gathers what is there.
-
-    Raises CaseError for a folder of another plan and for a quantity that the summaries do not
-    have; the error of the first variant when no variant can be run at all, before anything is
-    written.
+    Raises CaseError, for an unknown quantity, and the error of the first variant where none can
+    be run, before anything is written.
     """
+    goal = None if until is None else parse_until(until)
     if run:
         _refuse_hopeless(path, plan, how)
-    with campaign_folder(path, plan) as (held, lock):
+    with plans.campaign_folder(path, plan) as (held, lock):
         while True:
             if run:
                 run_missing(path, held, how, lock)
-            comparison = gather_plan(path, held, ranked_by=ranked_by)
-            refuse_unknown(comparison, ranked_by, "--rank-by")
+            comparison = results.gather_plan(path, held, ranked_by=ranked_by)
             more = 0
-            if until is not None and run and comparison.done:
-                refuse_unknown(comparison, until.quantity, "--until")
-                more = _seeds_to_add(until, comparison, len(held.seeds), most_seeds)
+            if goal is not None and run and comparison.done:
+                results.refuse_unknown(comparison, goal.quantity, "--until")
+                more = _seeds_to_add(goal, comparison, len(held.seeds), most_seeds)
             if not more:
                 return comparison
             how.say(f"{len(held.seeds)} seeds are not enough yet; {more} more")
             first = max(held.seeds) + 1
-            held = extended(path, held, range(first, first + more))
+            held = plans.extended(path, held, range(first, first + more))
 
 
 def _refuse_hopeless(path: Path, plan: Plan, how: HowToRun) -> None:
     """Raise what stops every variant, before anything is written."""
     errors: list[FdnetError] = []
-    program: dict[str, Any] = {
-        "liggghts": how.liggghts,
-        "launcher": how.launcher,
-        "timeout": how.timeout,
-    }
-    for one in plan.variants:
-        out = path / RUNS / f"{one.name}-seed-{one.case.seed}"
+    options: dict[str, Any] = {k: getattr(how, k) for k in ("liggghts", "launcher", "timeout")}
+    options |= {"ranks": plan.ranks, "stages": plan.stages}
+    for job in plan.jobs[: len(plan.variants)]:
         try:
-            refuse(one.case, RunOptions(out=out, ranks=plan.ranks, stages=plan.stages, **program))
-            return
+            return refuse(job.case, RunOptions(out=path / plans.RUNS / job.name, **options))
         except FdnetError as error:
             errors.append(error)
     raise errors[0]
 
 
 def _seeds_to_add(until: Until, comparison: Comparison, have: int, most: int) -> int:
-    """How many seeds more the spread so far asks for; 0 when every band is narrow enough.
-
-    The whole bands are looked at, not what the bounds of the quantity leave of them. Seeds at most
-    double at a time, because a spread of few seeds is itself uncertain.
-    """
+    """Seeds that the whole bands, not cut at their bounds, still ask for; at most twice as many,
+    because a spread of few seeds is itself uncertain."""
     needed = 0
     for name in comparison.variants:
         values = list(comparison.values(name, until.quantity).values())

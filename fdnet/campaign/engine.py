@@ -5,6 +5,7 @@ Each run is `fdnet run --resume` in a process of its own, which goes on where it
 
 import contextlib
 import ctypes
+import itertools
 import json
 import os
 import re
@@ -15,6 +16,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 from importlib.util import find_spec
 from pathlib import Path
@@ -33,16 +35,11 @@ ENGINES = ("local", "snakemake", "slurm")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HowToRun:
-    """How runs are carried out, as opposed to what they are.
+    """How runs are carried out: `jobs` at the same time, each stopped after `timeout` seconds.
 
-    Attributes:
-        jobs: how many at the same time.
-        liggghts: path of the binary; None: looked for.
-        launcher: template that starts several ranks; None: mpirun.
-        timeout: s, after which LIGGGHTS of one run is stopped; None: never.
-        engine: "local", "snakemake", or "slurm" (Snakemake with its executor for Slurm).
-        resources: of Snakemake for Slurm, as ("slurm_partition=short", "runtime=60").
-        quiet: whether to show no progress.
+    The engine is "local", "snakemake" or "slurm" (Snakemake with its executor for Slurm, which
+    gets `resources`, as "slurm_partition=short"). Where `liggghts` is None it is looked for, and
+    the launcher of several ranks is mpirun. `quiet` shows no progress.
     """
 
     jobs: int
@@ -84,14 +81,12 @@ class Task(NamedTuple):
 
 
 Ended = Callable[[str, int], None]
-"""Gets the name and the exit code of a task that has ended."""
 
 
 def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
     """Carry out what is missing of the plan; `lock` is the descriptor of the folder's lock.
 
-    A run that fails stops no other. Raises CaseError when the disk is full, when Snakemake is not
-    installed, and when it did not begin.
+    A run that fails stops no other. Raises CaseError for a full disk and for a missing Snakemake.
     """
     tasks = _tasks_of(path, plan, how)
     if not tasks:
@@ -106,13 +101,11 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
     how.say(f"{len(plan.jobs)} runs, {missing} of them to do")
     for task in tasks:
         _log(path, task.name).unlink(missing_ok=True)
-    count = 0
+    numbers = itertools.count(1)
 
     def ended(name: str, code: int) -> None:
-        nonlocal count
-        count += 1
         word = f"FAILED (exit code {code})" if code else "done"
-        how.say(f"{count} of {len(tasks)}: {name} {word}")
+        how.say(f"{next(numbers)} of {len(tasks)}: {name} {word}")
 
     if how.engine == "local":
         _run_pool(path, tasks, how.jobs, ended)
@@ -121,13 +114,17 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
 
 
 def _tasks_of(path: Path, plan: Plan, how: HowToRun) -> list[Task]:
-    """What is missing in the folder: packs that several runs share, and runs that are not done.
+    """Packs that several runs share, and runs that are not done.
 
-    A run whose files were changed is asked again, and `fdnet run` says so in its log.
+    A finished run whose files were changed is no task: it is named, and its files stay.
     """
     shared, packs, runs = plan.packs, dict[str, Task](), []
     for job in plan.jobs:
-        if state_of(path, plan, job).status == "done":
+        status, reason = state_of(path, plan, job)
+        changed = status == "failed" and (path / RUNS / job.name / MANIFEST).exists()
+        if changed:
+            how.say(f"{job.name} is left as it is: {reason}")
+        if changed or status == "done":
             continue
         start = [sys.executable, "-m", "fdnet.cli", "run", f"{CASES}/{job.name}.toml"]
         start += ["--resume", "--quiet", "--np", str(plan.ranks), *how.options]
@@ -182,17 +179,16 @@ def _stop(
             process.wait()
 
 
-# ------------------------------------------------------------------------------------------------
-# The pool: some processes at a time on this machine, nothing else needed.
-
-
+# ---- The pool: some processes at a time on this machine, nothing else needed.
 def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> None:
-    """Run the tasks, `jobs` at a time. One that fails stops only those that need what it makes.
+    """Run the tasks, `jobs` at a time; an exception stops the running ones in good order.
 
-    When this is left by an exception, the running ones are stopped in good order.
+    One that fails stops only those that need what it makes.
     """
     waiting, running, full = list(tasks), dict[str, subprocess.Popen](), False
     failed: set[str] = set()
+    # The kernel sends SIGTERM when the parent dies, however it dies (PR_SET_PDEATHSIG).
+    dies_with_parent = partial(ctypes.CDLL(None).prctl, 1, signal.SIGTERM, 0, 0, 0)
     try:
         while running or (waiting and not full):
             full = full or disk_is_full(path)
@@ -203,17 +199,14 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> Non
             ready = [task for task in waiting if task.after not in not_ended]
             for task in [] if full else ready[: jobs - len(running)]:
                 waiting.remove(task)
-                running[task.name] = _start(
-                    task.words, path, _log(path, task.name), preexec_fn=_end_with_parent
-                )
+                log = _log(path, task.name)
+                running[task.name] = _start(task.words, path, log, preexec_fn=dies_with_parent)
             for name in [name for name, process in running.items() if process.poll() is not None]:
                 code = running.pop(name).returncode
                 if code < 0:  # it could not write its reason itself
-                    with _log(path, name).open("a", encoding="utf-8") as log:
-                        log.write(
-                            f"\nfdnet: ended by signal {-code} ({signal.Signals(-code).name}), "
-                            "perhaps for want of memory; repeat the command to go on\n"
-                        )
+                    why = f"ended by signal {-code} ({signal.Signals(-code).name}), perhaps for "
+                    with _log(path, name).open("a", encoding="utf-8") as file:
+                        file.write(f"\nfdnet: {why}want of memory; repeat the command to go on\n")
                 failed |= {name} if code else set()
                 ended(name, code)
             time.sleep(PAUSE)
@@ -226,15 +219,7 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> Non
         )
 
 
-def _end_with_parent() -> None:
-    """Ask the kernel for a SIGTERM when the parent dies, however it dies (PR_SET_PDEATHSIG)."""
-    ctypes.CDLL(None).prctl(1, signal.SIGTERM, 0, 0, 0)
-
-
-# ------------------------------------------------------------------------------------------------
-# Snakemake, with the static Snakefile that comes with fdnet.
-
-
+# ---- Snakemake, with the static Snakefile that comes with fdnet.
 SNAKEFILE = str(resources.files("fdnet.campaign").joinpath("Snakefile"))
 _CONFIG = f"{LOGS}/snakemake.json"
 _REASON = re.compile(
@@ -307,8 +292,5 @@ def _quoted(resource: str) -> str:
     """
     name, _, value = resource.partition("=")
     if not name.isidentifier() or not value.isprintable() or not value:
-        raise CaseError(
-            f"--slurm: {resource!r}, expected resources of Snakemake as slurm_partition=short,"
-            "runtime=60"
-        )
+        raise CaseError(f"--slurm: {resource!r}, expected e.g. slurm_partition=short,runtime=60")
     return resource if value.isdecimal() else f"{name}={value.strip(chr(39) + chr(34))!r}"

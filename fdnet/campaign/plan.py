@@ -1,7 +1,6 @@
 """The plan of a campaign: a sweep file, its cases and seeds, and the folder that keeps it."""
 
 import contextlib
-import difflib
 import fcntl
 import hashlib
 import itertools
@@ -10,42 +9,29 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    ValidationError,
-    model_validator,
-)
+import pydantic
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from fdnet.case.case import Case
 from fdnet.case.file import read_case, toml_tables
 from fdnet.errors import CaseError
 from fdnet.files import expanded, refuse_folder_name, write_text
 from fdnet.names import STAGES
-from fdnet.report.tables import JsonObject, Summary, SummarySection, read_json, read_summary
+from fdnet.report.tables import JsonObject, read_json, read_summary
 from fdnet.run.folder import MANIFEST, check_finished
 
 MOST_JOBS = 1000
 """Most runs of a plan that are accepted without a word of confirmation."""
 
 
-# ------------------------------------------------------------------------------------------------
-# The plan: which cases are run with which seeds, frozen before the first run.
-
-
+# ---- The plan: which cases are run with which seeds, frozen before the first run.
 class Variant(NamedTuple):
-    """One case of a campaign, whose runs differ by the seed alone, and the keys that are varied.
-
-    Its name also begins the names of its run folders; its seed is that of the first run.
-    """
+    """One case of a campaign, with the seed of its first run, and the keys that are varied."""
 
     name: str
     keys: Mapping[str, Any]
@@ -62,17 +48,7 @@ class Job(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Plan:
-    """All runs of a campaign: every variant with every seed.
-
-    Attributes:
-        name: of the campaign.
-        variants: in the order in which they are shown.
-        seeds: of each variant.
-        ranks: MPI ranks of each run.
-        stages: of each run.
-        targets: of a design, as the sweep file gives them.
-        judge: the table [judge] of the sweep file, {} without one.
-    """
+    """All runs of a campaign: every variant with every seed; `targets` are those of a design."""
 
     name: str
     variants: tuple[Variant, ...]
@@ -80,24 +56,18 @@ class Plan:
     ranks: int = 1
     stages: tuple[str, ...] = STAGES
     targets: Mapping[str, Any] = field(default_factory=dict)
-    judge: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
         """Hash of what is run, whatever the number of seeds."""
-        what = [(one.name, _with_seed(one.case, 0).digest()) for one in self.variants]
+        what = [(v.name, v.case.model_copy(update={"seed": 0}).digest()) for v in self.variants]
         return _hash([sorted(what), self.ranks, sorted(self.stages)], 16)
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """The keys that are varied."""
-        return tuple(dict.fromkeys(key for one in self.variants for key in one.keys))
 
     @property
     def jobs(self) -> tuple[Job, ...]:
         """Every run; those of one seed stand together, so that few seeds of all come first."""
         return tuple(
-            Job(f"{one.name}-seed-{seed}", one, _with_seed(one.case, seed))
+            Job(f"{one.name}-seed-{seed}", one, one.case.model_copy(update={"seed": seed}))
             for seed in self.seeds
             for one in self.variants
         )
@@ -108,10 +78,6 @@ class Plan:
         digests = {job.name: job.case.digest("pack") for job in self.jobs}
         counts = Counter(digests.values())
         return {name: digest for name, digest in digests.items() if counts[digest] > 1}
-
-
-def _with_seed(case: Case, seed: int) -> Case:
-    return case.model_copy(update={"seed": seed})
 
 
 def _hash(data: Any, length: int) -> str:
@@ -143,9 +109,8 @@ def _named(variants: Sequence[Variant]) -> tuple[Variant, ...]:
         name = _safe(one.name)
         if len(name) > 80 or name in result:
             name = f"{name[:71]}-{_hash([one.case.digest(), dict(one.keys)], 8)}"
-        number, base = 2, name
-        while name in result:
-            name, number = f"{base}-{number}", number + 1
+        if variants.count(one) > 1:
+            raise CaseError(f"variants: {one.name} is given twice; leave one out")
         result[name] = one._replace(name=name)
     return tuple(result.values())
 
@@ -155,10 +120,7 @@ def _safe(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9.=+_-]+", "_", text).strip("._") or "variant"
 
 
-# ------------------------------------------------------------------------------------------------
-# The sweep file.
-
-
+# ---- The sweep file.
 def _dotted(table: Any) -> Any:
     """Keys of a case with their values: `fines.radius_mm` in quotes, or as a table of a table."""
     if not isinstance(table, Mapping):
@@ -188,22 +150,11 @@ def _distinct(seeds: Any) -> Any:
     return seeds
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
-
-
-class _Judge(_Table):
-    """Against which variant the others are judged, and in which numbers of the summaries."""
-
-    reference: Annotated[dict[str, Any], BeforeValidator(_dotted), Field(min_length=1)]
-    quantities: Annotated[list[str], Field(min_length=1)]
-
-
 _Values = Annotated[list[Any], Field(min_length=1)]
 
 
-class _SweepFile(_Table):
-    """What a sweep file holds."""
+class _SweepFile(pydantic.BaseModel):
+    model_config = pydantic.ConfigDict(extra="forbid", strict=True)
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")] | None = None
     case: str | None = None
@@ -213,9 +164,8 @@ class _SweepFile(_Table):
     grid: Annotated[dict[str, _Values], BeforeValidator(_dotted), AfterValidator(_varied)] = {}
     variants: list[dict[str, Any]] = []
     targets: dict[str, Any] = {}
-    judge: _Judge | None = None
 
-    @model_validator(mode="after")
+    @pydantic.model_validator(mode="after")
     def _fits(self) -> "_SweepFile":
         if (self.case is None) == (not self.cases):
             raise ValueError('case: give one case file as case = "a.toml", or cases = [...]')
@@ -230,35 +180,28 @@ class _SweepFile(_Table):
         rows = []
         for table in self.variants:
             own = dict(_varied(_dotted({k: v for k, v in table.items() if k != "name"})))
-            name = table.get("name", _label(own))
+            name = table.get("name", label_of(own))
             if not isinstance(name, str) or not name or not name.isprintable():
                 raise ValueError(f"variants.name: {name!r}, expected one line of text")
             rows.append((name, own))
         return rows
 
 
-def _label(keys: Mapping[str, Any]) -> str:
+def label_of(keys: Mapping[str, Any]) -> str:
     """Short name of a set of keys: `radius_mm=0.04+viscosity=10 cP`."""
-    return "+".join(f"{key.rsplit('.', 1)[-1]}={_short(value)}" for key, value in keys.items())
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return ",".join(f"{key}={_short(one)}" for key, one in value.items())
-    return str(value)
+    return "+".join(f"{key.rsplit('.', 1)[-1]}={value}" for key, value in keys.items())
 
 
 def sweep_plan(path: str | Path, *, limit: int = MOST_JOBS, **more: Any) -> Plan:
     """Every combination of the sweep file at `path`, each a checked case.
 
-    The paths of cases are relative to the file; `more` are ranks and stages. Raises CaseError,
-    which lists what is wrong in the file, or names the variant whose keys a case does not take,
-    or says how many runs more than `limit` it asks for.
+    The paths of cases are relative to the file. Raises CaseError for what is wrong in it, for
+    keys that a case does not take, and for more runs than `limit`.
     """
     place = expanded(path)
     try:
         file = _SweepFile.model_validate(toml_tables(path, "a sweep file"))
-    except ValidationError as error:
+    except pydantic.ValidationError as error:
         raise CaseError(f"{path}: {' | '.join(map(_problem, error.errors()))}") from error
     paths = [place.parent / expanded(case) for case in file.cases or [file.case or ""]]
     count = len(paths) * max(1, len(file.variants)) * math.prod(map(len, file.grid.values()))
@@ -270,69 +213,32 @@ def sweep_plan(path: str | Path, *, limit: int = MOST_JOBS, **more: Any) -> Plan
     ):
         swept = dict(zip(file.grid, values, strict=True))
         keys = {**own, **swept}
-        label = "+".join(filter(None, (name, _label(swept)))) or case_path.stem
+        label = "+".join(filter(None, (name, label_of(swept))))
         try:
             case = read_case(case_path, values={**file.set, **keys})
         except CaseError as error:
-            problems.append(f"{label}: {error}")
+            problems.append(f"{label}: {error}" if label else str(error))
             continue
-        label = label if keys else case.name
         if len(paths) > 1:
-            label = f"{case.name}-{label}" if keys else label
+            label = f"{case.name}-{label}" if keys else case.name
             keys = {"case_file": case_path.name} | keys
-        variants.append(Variant(label, keys, case))
+        variants.append(Variant(label or case.name, keys, case))
     if problems:
         raise CaseError(" || ".join(problems[:5]))
     if isinstance(file.seeds, int):
         seeds = [variants[0].case.seed + number for number in seeds]
-    judge = file.judge.model_dump() if file.judge else {}
-    _check_judge(f"{path}: judge", judge, variants)
-    return Plan(
-        name=file.name or _safe(place.stem),
-        variants=_named(variants),
-        seeds=tuple(seeds),
-        targets=file.targets,
-        judge=judge,
-        **more,
-    )
+    more |= {"name": file.name or _safe(place.stem), "targets": file.targets}
+    return Plan(variants=_named(variants), seeds=tuple(seeds), **more)
 
 
 def _problem(item: Any) -> str:
-    """One thing that is wrong in a sweep file, with its key and what was given."""
     key, message = ".".join(map(str, item["loc"])), item["msg"].removeprefix("Value error, ")
     if item["type"] == "extra_forbidden":
-        known = _Judge if key.startswith("judge.") else _SweepFile
-        return f"{key}: unknown key, expected some of {', '.join(known.model_fields)}"
-    if item["type"] == "string_pattern_mismatch":
-        message = "expected letters, digits, dots, underscores, hyphens, a letter or digit first"
+        return f"{key}: unknown key, expected some of {', '.join(_SweepFile.model_fields)}"
     return f"{key}: {item['input']!r:.60}, {message}" if key else message
 
 
-def _check_judge(place: str, judge: Mapping[str, Any], variants: Sequence[Variant]) -> None:
-    """Raises CaseError for a reference that is no variant and for a misspelt quantity.
-
-    Numbers that only some runs have, as those of a well, are known by their results alone.
-    """
-    reference = judge.get("reference", {})
-    if not any(reference.items() <= dict(one.keys).items() for one in variants):
-        keys = ", ".join(dict.fromkeys(key for one in variants for key in one.keys)) or "none"
-        raise CaseError(f"{place}.reference: {reference} is no variant; the varied keys: {keys}")
-    for name in judge.get("quantities", []):
-        section = re.fullmatch(r"sections\.[1-9]\d*\.(\w+)", name)
-        known, last = (SummarySection, section[1]) if section else (Summary, name)
-        near = difflib.get_close_matches(last, known.model_fields, n=3, cutoff=0.8)
-        further = re.fullmatch(r"\w+(\.\w+)*", name) and last.startswith(tuple(near) or "")
-        if last not in known.model_fields and not further:
-            raise CaseError(
-                f"{place}.quantities: {name!r} is no number of the summaries; did you mean "
-                f"{', '.join(near) or 'k_reduction'}?"
-            )
-
-
-# ------------------------------------------------------------------------------------------------
-# The folder of a campaign: one plan, and the case of each of its runs.
-
-
+# ---- The folder of a campaign: one plan, and the case of each of its runs.
 PLAN, CASES, RUNS, PACKS, LOGS, LOCK = "plan.json", "cases", "runs", "packs", "logs", ".lock"
 _Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9=+_-][A-Za-z0-9.=+_-]*$")]
 _Seed = Annotated[int, Field(ge=0, lt=2**31)]
@@ -340,42 +246,28 @@ _Seed = Annotated[int, Field(ge=0, lt=2**31)]
 
 class _Row(JsonObject):
     name: _Name
-    variant: _Name = "itself"
     keys: Mapping[str, Any] = {}
-    seed: _Seed = 0
 
 
 class _PlanRecord(JsonObject):
-    """What plan.json holds."""
-
     fdnet_campaign: Literal[1]
     name: str
     digest: str
     seeds: Annotated[list[_Seed], Field(min_length=1)]
     ranks: Annotated[int, Field(ge=1)] = 1
     stages: Sequence[str] = STAGES
-    targets: Mapping[str, Any] = {}
-    judge: Mapping[str, Any] = {}
     variants: Annotated[list[_Row], Field(min_length=1)]
     runs: Annotated[list[_Row], Field(min_length=1)]
 
 
 def read_plan_record(folder: Path) -> dict[str, Any] | None:
-    """What plan.json of a folder says; None where there is none.
-
-    Raises CaseError when it cannot be read.
-    """
-    path = folder / PLAN
-    if not path.exists():
-        return None
-    return read_json(path, _PlanRecord, noun="plan of this fdnet", advice="give another folder")
+    """plan.json of a folder, None where there is none. Raises CaseError where it is no plan."""
+    path, words = folder / PLAN, {"noun": "plan of this fdnet", "advice": "give another folder"}
+    return read_json(path, _PlanRecord, **words) if path.exists() else None
 
 
 def kept_plan(folder: Path) -> Plan | None:
-    """The plan that a folder keeps, from its plan.json and its cases; None where there is none.
-
-    Raises CaseError when they cannot be read.
-    """
+    """The plan that a folder keeps, from its plan.json and its cases; None where there is none."""
     record = read_plan_record(folder)
     if record is None:
         return None
@@ -383,54 +275,49 @@ def kept_plan(folder: Path) -> Plan | None:
     for one in record["variants"]:
         case = read_case(folder / CASES / f"{one['name']}-seed-{seeds[0]}.toml")
         variants.append(Variant(one["name"], one.get("keys", {}), case))
-    rest = {key: record[key] for key in ("ranks", "targets", "judge") if key in record}
-    stages = tuple(record.get("stages", STAGES))
-    return Plan(name=record["name"], variants=tuple(variants), seeds=seeds, stages=stages, **rest)
+    more = {"ranks": record.get("ranks", 1), "stages": tuple(record.get("stages", STAGES))}
+    return Plan(name=record["name"], variants=tuple(variants), seeds=seeds, **more)
+
+
+def refuse_foreign(path: Path, own: Collection[str], what: str) -> None:
+    """Raises CaseError when `path` cannot be a folder of results, or holds more than `own`."""
+    refuse_folder_name(path)
+    if path.exists() and not path.is_dir():
+        raise CaseError(f"{path}: is a file, expected a folder for --out")
+    if path.is_dir() and any(child.name not in own for child in path.iterdir()):
+        raise CaseError(
+            f"{path}: is not empty and holds no {what} of fdnet; give another --out (nothing was "
+            "changed)"
+        )
 
 
 @contextlib.contextmanager
 def campaign_folder(path: Path, plan: Plan) -> Iterator[tuple[Plan, int]]:
-    """Hold the lock of the folder while the block runs.
+    """Hold the lock of the folder while the block runs; gives all its plan and the descriptor.
 
-    Gives the plan with all its seeds and the descriptor of the locked file. A folder keeps its
-    plan. The same plan with further seeds extends it, and seeds that are there already stay.
-
-    Raises CaseError, with nothing changed, when the folder holds another plan or something else,
-    or when another campaign is writing there.
+    The same plan with further seeds extends the one that is kept. Raises CaseError, with nothing
+    changed, for a folder of another plan or of something else, and while another call works there.
     """
-    refuse_folder_name(path)
-    _refuse_foreign(path)
+    if read_plan_record(path) is None:
+        refuse_foreign(path, (LOCK, LOGS, CASES), "campaign")
     try:
         for below in (LOGS, CASES):
             (path / below).mkdir(parents=True, exist_ok=True)
-        lock = os.open(path / LOCK, os.O_RDWR | os.O_CREAT, 0o644)
+        file = (path / LOCK).open("r+b" if (path / LOCK).exists() else "w+b", buffering=0)
     except OSError as error:
         raise CaseError(
             f"{path}: cannot be made or written: {error.strerror}; give another --out"
         ) from error
-    try:
+    with file:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            holder = os.pread(lock, 500, 0).decode("utf-8", "replace")
+            holder = os.pread(file.fileno(), 500, 0).decode("utf-8", "replace")
             raise CaseError(
                 f"{path}: {holder or 'another fdnet is running jobs here; wait for it'}, or give "
                 "another --out"
             ) from error
-        yield _admitted(path, plan), lock
-    finally:
-        os.close(lock)
-
-
-def _refuse_foreign(path: Path) -> None:
-    if path.exists() and not path.is_dir():
-        raise CaseError(f"{path}: is a file, expected a folder for --out")
-    foreign = path.is_dir() and {child.name for child in path.iterdir()} - {LOCK, LOGS, CASES}
-    if foreign and read_plan_record(path) is None:
-        raise CaseError(
-            f"{path}: is not empty and holds no campaign of fdnet; give another --out (nothing "
-            "was changed)"
-        )
+        yield _admitted(path, plan), file.fileno()
 
 
 def _admitted(path: Path, plan: Plan) -> Plan:
@@ -447,11 +334,8 @@ def _admitted(path: Path, plan: Plan) -> Plan:
 
 
 def extended(path: Path, plan: Plan, seeds: Sequence[int]) -> Plan:
-    """The plan with further seeds, written to its folder.
-
-    The cases are written first, so that a plan never names a case that is not there, and only
-    where they change, because Snakemake repeats what is older than its case.
-    """
+    """The plan with further seeds, written to its folder after its cases, which are written only
+    where they change: Snakemake repeats what is older than its case."""
     plan = replace(plan, seeds=tuple(dict.fromkeys([*plan.seeds, *seeds])))
     packs, rows = plan.packs, []
     for job in plan.jobs:
@@ -460,7 +344,7 @@ def extended(path: Path, plan: Plan, seeds: Sequence[int]) -> Plan:
             write_text(file, text)
         row = {"name": job.name, "variant": job.variant.name, "seed": job.case.seed}
         rows.append(row | {"pack": packs.get(job.name, "")})
-    kept = ("name", "digest", "seeds", "ranks", "stages", "targets", "judge")
+    kept = ("name", "digest", "seeds", "ranks", "stages")
     record = {"fdnet_campaign": 1} | {name: getattr(plan, name) for name in kept}
     record["variants"] = [{"name": one.name, "keys": one.keys} for one in plan.variants]
     record["runs"] = rows
@@ -468,10 +352,7 @@ def extended(path: Path, plan: Plan, seeds: Sequence[int]) -> Plan:
     return plan
 
 
-# ------------------------------------------------------------------------------------------------
-# Which runs of a plan are done, and why the others are not.
-
-
+# ---- Which runs of a plan are done, and why the others are not.
 class State(NamedTuple):
     """How a run stands: "done", "failed" or "missing", and why it is not done, in one line."""
 
@@ -482,8 +363,7 @@ class State(NamedTuple):
 def state_of(path: Path, plan: Plan, job: Job) -> State:
     """How a run of the campaign in `path` stands.
 
-    It is done where it has all stages of the plan and every file as the run wrote it, and has
-    failed where one of its files was changed, cut or removed afterwards.
+    It has failed also where one of its files was changed, cut or removed afterwards.
     """
     folder = path / RUNS / job.name
     if not (folder / MANIFEST).exists():
@@ -500,10 +380,8 @@ def state_of(path: Path, plan: Plan, job: Job) -> State:
         read_summary(folder / "summary.json")
     except CaseError as error:
         return State("failed", str(error))
-    lacking = set(plan.stages) & set(job.case.stages) - set(manifest["stages"])
-    if lacking:
-        return State("missing", f"not run yet: {', '.join(sorted(lacking))}")
-    return State("done")
+    lacking = sorted(set(plan.stages) & set(job.case.stages) - set(manifest["stages"]))
+    return State("missing", f"not run yet: {', '.join(lacking)}") if lacking else State("done")
 
 
 def last_words(path: Path) -> str:

@@ -26,6 +26,7 @@ from fdnet.case.tables import (
     MOST_GRAINS,
     MOST_NEIGHBOUR_BINS,
     MOST_SLAB,
+    OF_THE_UNIFORM,
     AnalysisChoices,
     Bonds,
     Box,
@@ -414,10 +415,15 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
         and grains.count is None
     ):
         yield "grains.porosity: missing, give it (0 to 1) or grains.count"
-    if good("fines.count", "fines.slab_mm") and (fines.count is None) == (fines.slab_mm is None):
+    if good("fines.count", "fines.slab_mm") and fines.count and fines.slab_mm:
         yield (
-            f"fines.count: {fines.count} with fines.slab_mm: {fines.slab_mm}, "
-            "give exactly one of the two"
+            f"fines.count: {fines.count} with fines.slab_mm: {fines.slab_mm}, give one of the two,"
+            " or none for mud that comes until the stop rule"
+        )
+    if good("fines.count", "fines.slab_mm") and fines.endless and fines.supply == "slab":
+        yield (
+            "fines.supply: 'slab' puts all fines in at the start, but nothing says how many; give "
+            "fines.count or fines.slab_mm, or take 'batches'"
         )
     # Their number is bounded by memory, their plain sum of volumes by the box.
     if good("box.size_mm", "grains.radius_mm", "grains.porosity", "grains.count"):
@@ -519,7 +525,7 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
         )
     if (
         good("drag.drive_velocity_m_s", "contact.cohesion_J_m3")
-        and drag.drive_velocity_m_s is not None
+        and drag.drive_velocity_m_s not in ("auto", "fluid")
         and contact.cohesion_J_m3 is not None
     ):
         yield (
@@ -544,17 +550,21 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
 
     # the forces of the fluid
 
-    # The network moves the mud at the rate over the cross-section; it alone knows the drive.
-    if good("drag.field", "drag.upstream", "drag.drive"):
-        if drag.field == "network" and drag.upstream != "darcy":
+    # The network has one way for each of these; it alone knows the drive and the updates.
+    if good("drag.field", *(f"drag.{key}" for key in OF_THE_UNIFORM)) and drag.coupled:
+        for key in OF_THE_UNIFORM:
+            value, only = getattr(drag, key), Drag.model_fields[key].default
+            if value != only:
+                yield (
+                    f"drag.{key}: {value!r} belongs to drag.field 'uniform'; leave it out, or set "
+                    "drag.field = 'uniform'"
+                )
+    for key in ("drive", "update_travel"):
+        given_one = good("drag.field", f"drag.{key}") and getattr(drag, key) is not None
+        if given_one and not drag.coupled:
             yield (
-                f"drag.upstream: {drag.upstream!r}, but with drag.field 'network' the mud moves "
-                "at the rate over the cross-section; set drag.upstream = 'darcy'"
-            )
-        if drag.field != "network" and drag.drive is not None:
-            yield (
-                f"drag.drive: {drag.drive!r} belongs to drag.field 'network'; the uniform field "
-                "always has its first velocity; leave it out"
+                f"drag.{key}: {getattr(drag, key)!r} belongs to drag.field 'network'; the uniform "
+                "field always has its first velocity; leave it out"
             )
     if (
         good("drag.field", "grains.motion")
@@ -563,18 +573,7 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
     ):
         yield (
             "grains.motion: 'mobile' with drag.field 'network', whose pores are those of grains "
-            "that stay; take 'fixed'"
-        )
-    # The Reynolds number of coupled drag is that of the law of the crowd.
-    if (
-        good("drag.field", "drag.crowd", "drag.inertia")
-        and drag.field == "network"
-        and drag.crowd == "none"
-        and drag.inertia != "none"
-    ):
-        yield (
-            f"drag.inertia: {drag.inertia!r} with drag.field 'network' is part of the law of the "
-            "crowd; set drag.crowd = 'beetstra', or drag.inertia = 'none'"
+            "that stay; take 'fixed', or set drag.field = 'uniform'"
         )
     if (
         good("run.stop_rate", "drag.field", "drag.drive")
@@ -596,25 +595,8 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
             f"it is {drag.field!r}; set run.duration_ms, since the uniform field keeps its rate"
         )
     if (
-        good("drag.scheme", "drag.crowd", "drag.field")
-        and drag.coupled
-        and drag.scheme == "viscous"
-    ):
-        yield (
-            "drag.scheme: 'viscous' has one damping for all fines, drag.crowd "
-            f"{drag.crowd!r} one for each; take 'implicit' or 'held'"
-        )
-    if (
-        good("drag.update_travel", "drag.crowd", "drag.field")
-        and drag.update_travel is not None
-        and not drag.coupled
-    ):
-        yield (
-            f"drag.update_travel: {drag.update_travel:g} belongs to a drag that is computed while "
-            "LIGGGHTS waits; leave it out, or set drag.crowd = 'beetstra'"
-        )
-    if (
         good("drag.scheme", "drag.refresh_steps")
+        and not drag.coupled
         and drag.scheme != "held"
         and drag.refresh_steps not in (None, 1)
     ):
@@ -622,7 +604,12 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
             f"drag.refresh_steps: {drag.refresh_steps} belongs to drag.scheme 'held', not "
             f"{drag.scheme!r}"
         )
-    if good("drag.scheme", "fines.radius_mm") and drag.scheme == "viscous" and not fines.one_size:
+    if (
+        good("drag.scheme", "fines.radius_mm")
+        and not drag.coupled
+        and drag.scheme == "viscous"
+        and not fines.one_size
+    ):
         yield (
             f"drag.scheme: 'viscous' needs fines of one size, {size_text('fines', fines)} "
             "(LIGGGHTS's viscous force is one number a material); take 'held' or 'implicit'"
@@ -639,9 +626,9 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
         )
     if (
         good("drag.scheme", "drag.inertia")
+        and not drag.coupled
         and drag.inertia != "none"
         and drag.scheme in ("viscous", "implicit")
-        and not drag.coupled
     ):
         yield (
             f"drag.inertia: {drag.inertia!r} makes the drag coefficient depend on the slip, "

@@ -391,9 +391,9 @@ class Grains(Spheres):
 
 
 class Fines(Spheres):
-    """[fines], the invading particles: a slab of suspension upstream.
+    """[fines], the invading particles of the mud.
 
-    Give either `count` or `slab_mm`.
+    The mud comes until the stop rule ends the invasion; `count` or `slab_mm` says that less comes.
 
     A case without this table has no invasion: only the intact pack is made and analysed.
     """
@@ -418,7 +418,8 @@ class Fines(Spheres):
     solids_kg_m3: Positive | None = None
     """Mass of solids in a volume of mud, instead of `concentration`."""
     count: Annotated[int, Field(ge=1)] | None = None
-    """Number of fines supplied."""
+    """Number of fines supplied. When absent, and `slab_mm` too, mud comes until the stop rule, but
+    at most ten times what plugged the shipped cases, or five pore volumes of fines that pass."""
     slab_mm: Positive | None = None
     """Length of the slab of mud, instead of `count`."""
     supply: Literal["slab", "batches"] = "batches"
@@ -452,6 +453,11 @@ class Fines(Spheres):
     @property
     def _size_keys(self) -> tuple[Any, ...]:
         return self.radius_mm, self.sizes, self.materials
+
+    @property
+    def endless(self) -> bool:
+        """Whether the mud comes until the stop rule."""
+        return self.count is None and self.slab_mm is None
 
     @property
     def finest_m(self) -> float:

@@ -18,6 +18,7 @@ from pydantic import (
     Tag,
     ValidationError,
     field_validator,
+    model_validator,
 )
 from pydantic_core import PydanticCustomError
 
@@ -116,9 +117,9 @@ class Fluid(Part):
     darcy_length_mm: Positive | None = None
     """Length of a plug over which the whole overbalance is lost. When absent, without a well: the
     length of the box, which warns."""
-    darcy_law: Literal["darcy", "ergun"] = "darcy"
-    """The overbalance makes the velocity by the viscous loss alone ("darcy"), or with the loss by
-    inertia ("ergun"). "darcy" warns where inertia takes 5 % or more."""
+    darcy_law: Literal["ergun", "darcy"] = "ergun"
+    """The overbalance makes the velocity with the loss by inertia ("ergun"), or by the viscous
+    loss alone ("darcy"), which warns where inertia takes 5 % or more."""
 
     viscosity_Pa_s: ClassVar = InSI[float]("viscosity_cP", 1e-3)
     """Dynamic viscosity, Pa s."""
@@ -142,8 +143,9 @@ class Well(Part):
 
     radius_mm: Positive
     """Radius of the well, to the formation face."""
-    drainage_radius_m: Positive
-    """Radius at which the pressure is that of the undisturbed formation."""
+    drainage_radius_m: Positive = 100.0
+    """Radius at which the pressure is that of the undisturbed formation; 100 m is a well on 3 ha.
+    It counts by its logarithm: half or twice of it moves the velocity by 10 %."""
     formation_permeability_mD: Positive | None = None
     """Permeability of the formation. When absent: that of the pack by Carman and Kozeny, by the
     network where the flow follows the deposit."""
@@ -171,9 +173,9 @@ class ContactLaw(Part):
     model: Literal["hooke", "hertz"] = "hooke"
     """"hooke": linear springs. "hertz": Hertz-Mindlin contacts of the moduli."""
 
-    restitution: Literal["dry", "liquid"] = "dry"
-    """Rebound of fines: "dry" takes `damping_ratio` as it is, "liquid" lowers the restitution by
-    exp(-35 / St), St being the impact Stokes number."""
+    restitution: Literal["liquid", "dry"] = "liquid"
+    """Rebound of fines: "liquid" lowers the restitution by exp(-35 / St), St being the impact
+    Stokes number; "dry" takes `damping_ratio` as it is."""
     rolling_friction: Positive | None = None
     """Largest rolling torque of a contact over normal force and effective radius. When absent
     nothing resists rolling."""
@@ -217,8 +219,10 @@ class Bonds(Part):
     """Shear strength, Pa; None: bonds never break."""
 
 
-CROWD_TRAVEL, FLOW_TRAVEL, MOST_TRAVEL = 0.5, 1.0, 10.0
-"""Diameters of the smallest fine between two updates: by default, and at most."""
+FLOW_TRAVEL, MOST_TRAVEL = 1.0, 10.0
+"""Diameters of the smallest fine between two updates of the flow: by default, and at most."""
+OF_THE_UNIFORM = ("scheme", "refresh_steps", "upstream", "pressure_gradient", "inertia")
+"""Keys of [drag] that only the uniform field leaves open."""
 
 
 class Box(Part):
@@ -251,42 +255,61 @@ class Box(Part):
 class Drag(Part):
     """[drag], the forces of the fluid on every fine.
 
-    Drag by its slip, and that of the pressure gradient.
+    Drag by its slip, and that of the pressure gradient. Where the fluid follows the deposit the
+    drag is that of Beetstra and others (2007), with the porosity and the Reynolds number around
+    each fine.
     """
 
-    field: Literal["uniform", "network"] = "uniform"
-    """"uniform": one velocity everywhere. "network": the fluid follows the pores and the deposit
-    in them."""
+    field: Literal["network", "uniform"] = "network"
+    """"network": the fluid follows the pores and the deposit in them. "uniform": one velocity
+    everywhere, and the drag of a lone sphere."""
     multiplier: Positive = 1.0
-    """Factor on the Stokes drag."""
-    scheme: Literal["held", "implicit", "viscous"] = "held"
-    """"held" keeps the force for `refresh_steps` steps, "viscous" takes viscous damping (fines of
-    one size), "implicit" is stable at any step."""
+    """Factor on the drag."""
+    scheme: Literal["implicit", "held", "viscous"] = Field(
+        "implicit",
+        description='With the field "uniform": "held" (when absent) keeps the force for '
+        '`refresh_steps` steps, "viscous" takes viscous damping (fines of one size), "implicit" '
+        'is stable at any step, and is what the field "network" takes.',
+    )
     refresh_steps: Annotated[int, Field(ge=1)] | None = None
     """Steps for which "held" keeps the force. When absent: at most 0.05 of the relaxation time."""
-    drive_velocity_m_s: Positive | Literal["auto"] | None = None
-    """Velocity in the pores of the simulation, to shorten a run with a weak push. All forces are
-    scaled by the same factor. Allowed up to an impact Stokes number of 1; "auto" drives to 0.1."""
-    upstream: Literal["interstitial", "darcy"] = "darcy"
-    """Velocity upstream of the face: "darcy", or "interstitial" as in the pack, which brings the
-    mud too fast."""
+    drive_velocity_m_s: Positive | Literal["auto", "fluid"] = Field(
+        "auto",
+        description="Velocity in the pores of the simulation, to shorten a run with a weak push. "
+        "All forces are scaled by the same factor. Allowed up to an impact Stokes number of 1; "
+        '"auto" (when absent with the field "network") drives to 0.1, but never slower than the '
+        'fluid moves and not with cohesion; "fluid" (when absent with "uniform") is its own.',
+    )
+    upstream: Literal["darcy", "interstitial"] = "darcy"
+    """Velocity upstream of the face: "darcy", or, with the field "uniform", "interstitial" as in
+    the pack, which brings the mud too fast."""
     pressure_gradient: bool = True
-    """Whether the pressure gradient pushes the fines inside the pack. The thesis's cases leave it
-    out."""
-    inertia: Literal["none", "schiller-naumann"] = "none"
-    """"none": Stokes drag at any speed. "schiller-naumann": times 1 + 0.15 Re^0.687 (Re up to 800;
-    scheme "held")."""
-    crowd: Literal["none", "beetstra"] = "none"
-    """"none": the drag of a lone sphere. "beetstra": the law of Beetstra and others (2007) with
-    the porosity around each fine."""
+    """Whether the pressure gradient pushes the fines inside the pack. Only the field "uniform" can
+    leave it out; the thesis's cases do."""
+    inertia: Literal["schiller-naumann", "none"] = Field(
+        "schiller-naumann",
+        description='With the field "uniform" and the scheme "held": drag times '
+        '1 + 0.15 Re^0.687 (Re up to 800; when absent), or "none", Stokes drag at any speed, as '
+        "with the other schemes.",
+    )
     drive: Literal["pressure", "rate"] | None = None
     """What stays constant with the field "network": "pressure" (when absent) or "rate"."""
     update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
         None,
         description="How far the fluid carries a fine, in diameters of the smallest fine, before "
-        "the forces on all fines are computed anew. When absent: "
-        f'{FLOW_TRAVEL:g} where the field is "network", else {CROWD_TRAVEL:g}.',
+        'the forces on all fines are computed anew with the field "network". When absent: '
+        f"{FLOW_TRAVEL:g}.",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_usual_in_a_uniform_field(cls, given: Any) -> Any:
+        if not isinstance(given, Mapping) or given.get("field") != "uniform":
+            return given
+        filled = {"scheme": "held", "drive_velocity_m_s": "fluid"} | dict(given)
+        if filled["scheme"] in ("implicit", "viscous"):
+            filled.setdefault("inertia", "none")
+        return filled
 
     @field_validator("scheme", mode="before")
     @classmethod
@@ -296,7 +319,7 @@ class Drag(Part):
     @property
     def coupled(self) -> bool:
         """Whether fdnet computes the forces on each fine while LIGGGHTS waits."""
-        return self.crowd != "none" or self.field == "network"
+        return self.field == "network"
 
     @property
     def slowed(self) -> bool:
@@ -306,8 +329,7 @@ class Drag(Part):
     @property
     def travel_diameters(self) -> float:
         """Diameters of the smallest fine between two updates of a coupled invasion."""
-        usual = FLOW_TRAVEL if self.field == "network" else CROWD_TRAVEL
-        return usual if self.update_travel is None else self.update_travel
+        return FLOW_TRAVEL if self.update_travel is None else self.update_travel
 
 
 class Gravity(Part):
@@ -335,7 +357,7 @@ class Run(Part):
     they differ from those of the simulation with `drag.drive_velocity_m_s`.
     """
 
-    stiffness_N_m: Positive | Literal["nominal", "auto"] = DEFAULT_STIFFNESS
+    stiffness_N_m: Positive | Literal["nominal", "auto"] = "auto"
     """Stiffness of the stiffest contact; all others keep their ratio to it. With "hertz": force
     over overlap of a fine's stiffest contact at 1 % of its diameter. "nominal" keeps the real
     stiffness. "auto" takes the least that keeps predicted overlaps at 3 %: in the uniform field at

@@ -136,19 +136,12 @@ def _finish(
     With `limits` of targets, the variants are ranked by them first.
     """
     from fdnet.campaign import page
-    from fdnet.campaign.result import candidates
 
-    muds = candidates(comparison, limits) if limits else []
-    states = [{"name": mud.name, "state": mud.state} for mud in muds]
-    more: dict[str, Any] = {"design": states, "targets": limits} if limits else {}
-    summary = page.write_comparison(comparison, more, muds)
+    made = page.write_comparison(comparison, limits)
     if options.json:
-        print(json.dumps(summary, indent=1, default=str))
+        print(json.dumps(made.summary, indent=1))
     else:
-        lines = [*page.candidate_lines(muds), *page.ranking_lines(comparison)]
-        for line in [*lines, *page.pair_lines(comparison)]:
-            print(line)
-        print(f"page: {comparison.path / 'compare.html'}")
+        print(made, f"page: {made.path / 'compare.html'}", sep="\n")
     for line in page.failure_lines(comparison):
         print(f"fdnet: {line}", file=sys.stderr)
     return SOME_FAILED if comparison.failed else 0
@@ -158,13 +151,13 @@ def _run_campaign(
     options: argparse.Namespace, plan: "Plan", limits: Mapping[str, float] | None = None
 ) -> int:
     """Carry out a plan and write its results; returns the exit code."""
-    from fdnet.campaign.api import carry_out, parse_until
+    from fdnet.campaign.api import carry_out
 
     comparison = carry_out(
         Path(options.out),
         plan,
         _how_of(options),
-        None if options.until is None else parse_until(options.until),
+        options.until,
         options.rank_by,
         most_seeds=options.max_seeds,
         run=not options.gather,

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.errors import CaseError
+from fdnet.errors import PAGE, CaseError
 from fdnet.files import path_option
 from fdnet.names import STAGES
 
@@ -280,7 +280,7 @@ def _run(options: argparse.Namespace) -> int:
         )
     summary = run_stages(case, chosen)
     for text in summary.get("warnings", []):
-        if "3-D picture" in text:
+        if text.endswith(f"{PAGE}#no-picture)"):
             _warn(text)
     if options.json:
         print(json.dumps(summary, indent=2))

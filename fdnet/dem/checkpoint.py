@@ -25,7 +25,7 @@ from fdnet.dem.deck import number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
 from fdnet.errors import CaseError, Doubt, DumpError, LiggghtsError, explained
 from fdnet.files import write_text
-from fdnet.scales.clock import PRESSED, arrival_time, rises
+from fdnet.scales.clock import ARRIVALS, PRESSED, arrival_time, rises
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.geometry import groups_apart, max_overlap
@@ -360,7 +360,7 @@ def quiet_chunks(scales: InvasionScales) -> int:
 
 
 def plug_allowance(case: InvasionCase, scales: InvasionScales) -> int:
-    """Fines that may cross the face within the plug time while it counts as plugged.
+    """Fines that may cross face (and outlet) within the plug time of a face that is plugged.
 
     They are `run.plug_rate` of those that the undisturbed suspension would bring.
     """
@@ -377,10 +377,37 @@ def empty_chunks(case: InvasionCase, scales: InvasionScales) -> int:
     return max(quiet_chunks(scales), math.ceil(passage / (chunk * scales.time_step)))
 
 
-def quiet_enough(case: InvasionCase, scales: InvasionScales, row: Checkpoint) -> bool:
-    """Whether the stop rule holds at this checkpoint."""
+REST = 0.01
+"""Mean velocity of the fines inside over that of the fluid at the start, at which they rest."""
+
+
+def quiet_enough(
+    folder: Path, case: InvasionCase, scales: InvasionScales, row: Checkpoint
+) -> bool:
+    """Whether the stop rule holds at this checkpoint.
+
+    In the uniform field it is the thesis's: no more fines cross the face in the plug time than
+    the allowance, or once no fine is left upstream, none leaves in the time of `empty_chunks`.
+
+    Where the flow follows the deposit it looks at all that moves. No more than the allowance cross
+    the face and the outlet together, and the fines inside are at `REST`. This takes the plug time
+    while mud is left at the face, and else the time of `empty_chunks`. Fewer than `ARRIVALS` fines
+    are no mud: they say nothing of the face.
+    """
     waiting = row.upstream - row.removed_upstream
-    return row.quiet >= (quiet_chunks(scales) if waiting > 0 else empty_chunks(case, scales))
+    follows = case.drag.field == "network"
+    mud = waiting >= ARRIVALS if follows else waiting > 0
+    if row.quiet < (quiet_chunks(scales) if mud else empty_chunks(case, scales)):
+        return False
+    return not follows or _speed_inside(folder, case, row) <= REST * scales.drive_velocity
+
+
+def _speed_inside(folder: Path, case: InvasionCase, row: Checkpoint) -> float:
+    """Mean velocity along the flow, m/s, of the fines inside at a checkpoint; 0 without any."""
+    fines = snapshot_of(read_frame(folder / "post" / f"invade_{row.step}.dump"), case, time_s=0.0)
+    depth = fines.fines().position[:, 0]
+    inside = (depth >= 0) & (depth < case.size_m[0])
+    return float(np.mean(fines.fines().velocity[inside, 0])) if inside.any() else 0.0
 
 
 def flow_says(folder: Path, case: InvasionCase, scales: InvasionScales, step: int) -> str | None:

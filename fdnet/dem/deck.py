@@ -243,9 +243,9 @@ def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]
     The drag on a fine of radius r and velocity v is 6 pi mu M r (u - v): mu the viscosity, M the
     multiplier, u the velocity of the fluid, at x < 0 that of the mud.
     """
-    hold = scales.hold_steps if scales.hold_steps > 1 else 0
     if case.drag.coupled:
-        return {"coupled": True, "scheme": case.drag.scheme, "hold_steps": hold}
+        return {"coupled": True}
+    hold = scales.hold_steps if scales.hold_steps > 1 else 0
     coefficient = case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier
     slower, slope = scales.drive_velocity - scales.upstream_velocity, scales.push.reynolds_slope
     shared = {
@@ -301,7 +301,7 @@ def forces_left_out(case: InvasionCase) -> list[LeftOut]:
         ("force of the pressure gradient", "switched off", not drag.pressure_gradient),
         (on_grains, "the fluid pushes the fines only", pushed),
         ("drag at finite Reynolds numbers", "not asked for", drag.inertia == "none"),
-        ("drag in a crowd", "not asked for", drag.crowd == "none"),
+        ("drag in a crowd", "the uniform field has none", not drag.coupled),
     ]
     return [LeftOut(what, why) for what, why, left in reasons if left]
 

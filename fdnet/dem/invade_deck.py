@@ -149,12 +149,6 @@ def write_forces(folder: Path, spheres: Snapshot, forces: FluidForces) -> None:
         (folder / "post" / f"fluid.{name}").write_text(form % tuple(value[some].tolist()))
 
 
-def largest_share(spheres: Snapshot, forces: FluidForces, density: Array, time: float) -> float:
-    """`time` s over the shortest relaxation time m / C of a fine of `density` (N,) kg/m3."""
-    rate = drag_rate(spheres.fines(), forces.coefficient, density)
-    return float(np.max(rate, initial=0.0)) * time
-
-
 def drag_rate(fines: Snapshot, coefficient: Array, density: Array | float) -> Array:
     """C / m (N,) 1/s, at which drag takes up the slip of N `fines`.
 
@@ -167,18 +161,15 @@ def coupled_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
     """Name and text of each file that a coupled deck is continued by; empty when it is not."""
     if not case.drag.coupled:
         return {}
-    coefficient = "Ksl" if case.drag.scheme == "implicit" else "cd"
     shown = dump_variables(case)
     asked = {"dump_columns": _shown_columns(case), "dump_group": shown["dump_group"]}
-    counted = shown | {"allowance": plug_allowance(case, scales)}
+    follows = case.drag.field == "network"
+    counted = shown | {"allowance": plug_allowance(case, scales), "follows": follows}
     parts = {
         "ask.in": render_text("ask.in.j2", asked | {"state": STATE}),
-        "fluid.in": render_text("fluid.in.j2", {"coefficient": coefficient}),
+        "fluid.in": render_text("fluid.in.j2", {}),
         "checkpoint.in": render_text("checkpoint.in.j2", counted),
     }
-    drag = drag_variables(case, scales)
-    if drag["hold_steps"]:
-        parts["held.in"] = render_text("held.in.j2", {"drag": drag})
     return parts
 
 
@@ -347,6 +338,7 @@ def render_invade(
             # they follow from the distance that it has moved
             "feeding": {"first": AT_ONCE, "last": batches - 1} if batches > AT_ONCE else None,
             "slowed": case.drag.slowed,
+            "follows": case.drag.field == "network",
             "supply": SUPPLY,
             "chunks": chunks_of(case, scales),
             "stop_when_plugged": case.run.duration_s is None,

@@ -51,7 +51,6 @@ from fdnet.dem.invade_deck import (
     DrivingFluid,
     Moment,
     fine_density,
-    largest_share,
     read_state,
     render_invade,
     write_batch,
@@ -64,7 +63,7 @@ from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
 from fdnet.dem.supply import batches_of, densities, later_batch
 from fdnet.errors import CaseError, Doubt, LiggghtsError
 from fdnet.files import disk_is_full, write_text
-from fdnet.scales.clock import DRAG_LIMIT, rises
+from fdnet.scales.clock import ARRIVALS, rises
 from fdnet.scales.scales import InvasionScales, stiffened
 from fdnet.spheres.dump import Frame
 from fdnet.spheres.snapshot import Snapshot
@@ -137,9 +136,8 @@ class ChunkedStage(ABC):
         if self.case.drag.coupled != (self.fluid is not None):
             needs, some = ("needs", "a") if self.case.drag.coupled else ("takes", "no")
             raise CaseError(
-                f"drag.crowd: {self.case.drag.crowd!r} with drag.field {self.case.drag.field!r} "
-                f"{needs} {some} fluid that fdnet computes; run the case with fdnet run or "
-                "fdnet.run_case"
+                f"drag.field: {self.case.drag.field!r} {needs} {some} fluid that fdnet computes; "
+                "run the case with fdnet run or fdnet.run_case"
             )
         (self.folder / "post").mkdir(parents=True, exist_ok=True)
         self.points.refuse_another_way(self.launch.ranks)
@@ -212,8 +210,7 @@ class ChunkedStage(ABC):
     def _play(self, name: str, last: Any | None, feed: Feed) -> None:
         """Feed LIGGGHTS a coupled stage, from the deck `name`, until its springs must be others.
 
-        Raises LiggghtsError when explicit drag would overshoot, DumpError when LIGGGHTS did not
-        show its spheres, and what the fluid raises.
+        Raises DumpError when LIGGGHTS did not show its spheres, and what the fluid raises.
         """
         assert self.fluid is not None
         updates = Updates(self.folder, self.fluid.measured, upto=last.step if last else 0)
@@ -226,8 +223,6 @@ class ChunkedStage(ABC):
             end, fresh = step + pace.checkpoint_steps, True
             while step < end:
                 steps = self._update(feed, updates, last, pace, end - step)
-                if fresh and self.case.drag.scheme == "held" and self.scales.hold_steps > 1:
-                    feed("include held.in")
                 feed(f"run {steps}" + ("" if fresh else " pre no post no"))
                 step, fresh = step + steps, False
             feed("include checkpoint.in")
@@ -263,14 +258,6 @@ class ChunkedStage(ABC):
         )
         assert self.fluid is not None
         forces = self.fluid.forces(spheres, moment)
-        share = largest_share(spheres, forces, density, dt * self.scales.hold_steps)
-        if self.case.drag.scheme != "implicit" and share > DRAG_LIMIT:
-            raise LiggghtsError(
-                f"{self.folder}: at step {spheres.step} drag is constant for {share:.3g} "
-                f"relaxation times of a fine in the crowd (limit {DRAG_LIMIT:g}), explicit drag "
-                "would overshoot; take drag.scheme = 'implicit', or lower run.time_step_factor, "
-                "and start over with --force"
-            )
         write_forces(self.folder, spheres, forces)
         updates.add(step, time, forces.measures)
         feed("include fluid.in")
@@ -290,13 +277,11 @@ class ChunkedStage(ABC):
 def steps_between(case: InvasionCase, scales: InvasionScales, pace: float) -> int:
     """Steps in which a fine at `pace` m/s covers `drag.update_travel` smallest diameters.
 
-    They are whole refreshes of the drag, at least one.
+    They are at least one, and at most those of a chunk.
     """
     travel = case.drag.travel_diameters * 2 * case.fines.radius_range_m[0]
-    refresh = scales.time_step * scales.hold_steps
-    most = scales.checkpoint_steps // scales.hold_steps
-    refreshes = travel / (pace * refresh) if pace > 0 else math.inf
-    return max(1, math.floor(min(refreshes, most))) * scales.hold_steps
+    steps = travel / (pace * scales.time_step) if pace > 0 else math.inf
+    return max(1, math.floor(min(steps, scales.checkpoint_steps)))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -330,7 +315,7 @@ class EndedStage:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Invasion(EndedStage):
-    """A finished invasion; its `stop_reason` is also "plugged" or "supply_exhausted".
+    """A finished invasion; `stop_reason` is also "plugged", "supply_exhausted" or "mud_cut_off".
 
     Attributes:
         supplied: number of fines that took part: all, or those of the batches that had come.
@@ -377,7 +362,7 @@ class InvadeStage(ChunkedStage):
             self.folder, case, scales, last.step
         ):
             return True
-        return case.run.duration_s is None and quiet_enough(case, scales, last)
+        return case.run.duration_s is None and quiet_enough(self.folder, case, scales, last)
 
     def pace(self, last: Checkpoint | None) -> InvasionScales:
         """The scales of the chunk after `last`, with springs that bear what the chunk before saw.
@@ -443,7 +428,8 @@ class InvadeStage(ChunkedStage):
     def ending(self, history: Sequence[Checkpoint]) -> tuple[str, list[str]]:
         """The stop reason, and warnings.
 
-        An empty slab decides nothing about plugging, so it is a reason of its own.
+        An empty slab decides nothing about plugging, so it is a reason of its own: fewer than
+        `ARRIVALS` fines wait upstream. Mud without an end was cut off then.
         """
         case, scales, last = self.case, self.scales, history[-1]
         waiting = last.upstream - last.removed_upstream
@@ -451,8 +437,9 @@ class InvadeStage(ChunkedStage):
         reason = flow_says(self.folder, case, scales, last.step)
         if reason is None and case.run.duration_s is not None:
             reason = "duration"
-        elif reason is None and quiet_enough(case, scales, last):
-            reason = "plugged" if waiting > 0 else "supply_exhausted"
+        elif reason is None and quiet_enough(self.folder, case, scales, last):
+            reason = "mud_cut_off" if case.fines.endless else "supply_exhausted"
+            reason = "plugged" if waiting >= ARRIVALS else reason
         elif reason is None:
             reason, cap = "cap", scales.cap_time * scales.force_factor
             warnings.append(
@@ -462,11 +449,20 @@ class InvadeStage(ChunkedStage):
                     "held: raise run.cap_ms",
                 )
             )
-        if waiting == 0:
+        if case.fines.endless and (waiting == 0 or reason == "mud_cut_off"):
+            warnings.append(
+                Doubt(
+                    "mud-cut-off",
+                    f"the mud was cut off after {scales.supplied_count} fines "
+                    f"({1e3 * scales.slab_length:.3g} mm of mud): give fines.slab_mm for more",
+                )
+            )
+        elif waiting == 0 or reason == "supply_exhausted":
+            left = f"only {waiting} fines are" if waiting else "no fine is"
             warnings.append(
                 Doubt(
                     "empty-slab",
-                    "no fine is left upstream: the end was decided by an empty slab, raise "
+                    f"{left} left upstream: the end was decided by an empty slab, raise "
                     "fines.count or fines.slab_mm",
                 )
             )

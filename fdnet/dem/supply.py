@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from fdnet.case.case import InvasionCase, concentration_text
 from fdnet.errors import CaseError
+from fdnet.scales.clock import ARRIVALS
 from fdnet.scales.scales import InvasionScales
 from fdnet.sizes import dealt
 from fdnet.spheres.geometry import wrapped
@@ -236,17 +237,21 @@ def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
     """The batches of a case: of equal length, with the slab's fines shared out evenly.
 
     A slab that is fed at once is one batch, and so is one of so few fines that some batch would be
-    empty. No batch is thinner than a fine, so that each must clear only the one next to it.
+    empty. Mud without an end has longer batches then. No batch is thinner than a fine, so that
+    each must clear only the one next to it.
     """
     travel = scales.upstream_velocity * scales.checkpoint_steps * scales.time_step
     apart = 1.01 * CLEARANCE * 2 * case.fines.radius_range_m[1]
     length = max(travel / (1 - case.fines.placed_fraction / LOOSEST_CAKE), apart)
+    if case.fines.endless:  # no batch is empty
+        length = max(length, ARRIVALS * scales.slab_length / scales.supplied_count)
     whole = Batches(counts=(scales.supplied_count,), length=scales.slab_length, travel=travel)
     if case.fines.supply == "slab" or scales.slab_length <= AT_ONCE * length:
         return whole
     number = math.ceil(scales.slab_length / length - 1e-9)
     share = np.minimum(np.arange(1, number + 1) * length / scales.slab_length, 1.0)
     counts = np.diff(np.round(share * scales.supplied_count).astype(int), prepend=0)
+    counts = counts[counts > 0] if case.fines.endless else counts
     if not counts.all():
         return whole
     return Batches(counts=tuple(int(count) for count in counts), length=length, travel=travel)
@@ -469,5 +474,6 @@ def _refuse_lost(case: InvasionCase, lost: int, count: int, length: float) -> No
     if lost:
         raise CaseError(
             f"{concentration_text(case.fines)} leaves {lost} of {count} fines without a place in "
-            f"a slab of {1e3 * length:.3g} mm; lower it or lengthen fines.slab_mm"
+            f"a slab of {1e3 * length:.3g} mm; lower it"
+            + ("" if case.fines.endless else " or lengthen fines.slab_mm")
         )

@@ -28,6 +28,10 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot, one_line
 
 CONTACT_GAP = 0.01
 """Spheres this far apart, in diameters of the smaller one, touch."""
+HELD_BY = 2
+"""Fewest contacts of a fine that stands. In cakes that LIGGGHTS made, of one size and of many, this
+gives the fines slower than half the velocity of the fluid best: 2 and 6 % more resistance than
+theirs, 3 contacts give 5 and 19 % less, for small fines lie caged between others."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +43,7 @@ class Invaded:
         volume: m3, of whole spheres.
         depth: m, of the deepest; 0 without fines.
         depth_p95: m, above which 95 % of them lie; 0 without fines.
-        cake_thickness: m, of the fines upstream of the face that touch the pack.
+        cake_thickness: m, of the fines that stand upstream of the face.
     """
 
     count: int
@@ -57,24 +61,24 @@ def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
     fines = spheres.fines()
     low, high = spheres.box[0]
     within = (fines.position[:, 0] >= low) & (fines.position[:, 0] < high)
-    depth, front = fines.position[within, 0] - low, low
+    depth, thickness = fines.position[within, 0] - low, 0.0
     if np.any(fines.position[:, 0] < low):
-        cake = cake_of(spheres, periodic)
-        front = (cake.position[:, 0] - cake.radius).min(initial=low)
+        thickness = cake_thickness(cake_of(spheres, periodic))
     return Invaded(
         count=int(within.sum()),
         volume=float(4.0 / 3.0 * np.pi * np.sum(fines.radius[within] ** 3)),
         depth=float(depth.max(initial=0.0)),
         depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
-        cake_thickness=float(max(low - front, 0.0)),
+        cake_thickness=thickness,
     )
 
 
 def cake_of(spheres: Snapshot, periodic: Sequence[bool]) -> Snapshot:
-    """The fines upstream of the face that touch the pack, maybe by other fines.
+    """The fines that stand upstream of the face: each is held by at least `HELD_BY` others.
 
-    Contact is a gap of at most 1 % of the smaller diameter. The pack is the grains and the fines
-    centred inside the box.
+    The others are grains, fines centred inside the box, and fines that stand too; all hang
+    together from the pack on. So a fine that falls on the cake or drifts along it is none of it,
+    nor is a chain of them. Contact is a gap of at most 1 % of the smaller diameter.
     """
     low = float(spheres.box[0, 0])
     reach = float(np.max(spheres.radius)) * (2.0 + 4.0 * CONTACT_GAP)
@@ -82,14 +86,24 @@ def cake_of(spheres: Snapshot, periodic: Sequence[bool]) -> Snapshot:
     upstream = (everything.position[:, 0] < low) & (everything.kind == Kind.FINE)
     around = (False, bool(periodic[1]), bool(periodic[2]))
     pair, _ = touching_pairs(everything, around, gap=CONTACT_GAP)
+    count, loose = len(everything), upstream
+    while loose.any():
+        loose = upstream & (np.bincount(pair.ravel(), minlength=count) < HELD_BY)
+        pair = pair[~loose[pair].any(axis=1)]
+        upstream = upstream & ~loose
     # all spheres of the pack are one group: tie them to an extra node
-    count = len(everything)
-    pack = np.flatnonzero(~upstream)
+    pack = np.flatnonzero((everything.position[:, 0] >= low) | (everything.kind != Kind.FINE))
     rows = np.concatenate([pair[:, 0], pack])
     columns = np.concatenate([pair[:, 1], np.full(len(pack), count)])
     graph = sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), shape=(count + 1, count + 1))
     _, group = connected_components(graph, directed=False)
     return everything.where(upstream & (group[:-1] == group[-1]))
+
+
+def cake_thickness(cake: Snapshot) -> float:
+    """Way from the face to the foremost of the fines of a `cake`, m; 0 without fines."""
+    low = float(cake.box[0, 0])
+    return float(max(low - np.min(cake.position[:, 0] - cake.radius, initial=low), 0.0))
 
 
 # ------------------------------------------------------------------------------------------------

@@ -678,18 +678,8 @@ def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
     edges = np.array([-row["x_hi_m"] for row in rows] + [-rows[-1]["x_lo_m"]])
     stairs(left, edges, [row["porosity"] for row in rows], color=BLUE)
     left.set(ylabel="porosity (–)", ylim=(0, 1))
-    for key, colour, line, name in (
-        ("k_network_m2", BLUE, "-", "network"),
-        ("k_kozeny_m2", ORANGE, "--", "Carman-Kozeny"),
-    ):
-        if any(row[key] is not None for row in rows):
-            style = {"color": colour, "linestyle": line, "label": name}
-            stairs(right, edges, [row[key] for row in rows], **style)
-    if right.get_legend_handles_labels()[0]:
-        right.set(ylabel="permeability (m²)", yscale="log")
-        legend_above(right)
-    else:
-        right.set_axis_off()
+    stairs(right, edges, [row["k_m2"] for row in rows], color=BLUE)
+    right.set(ylabel="permeability (m²)", yscale="log")
     for axes in (left, right):
         axes.set(xlabel="distance from the face (mm)", xlim=(0, MM * edges[-1]))
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.case.tables import Run
-from fdnet.errors import Doubt
+from fdnet.errors import SHOWN, Doubt
 from fdnet.names import STAGES
 from fdnet.report.tables import (
     AGREES,
@@ -103,13 +103,8 @@ ENDS = {
     "supply_exhausted": "the supply of fines ran out (the face is still open)",
     "duration": "the set time or volume was over (the face may still be open)",
     "cap": "the run reached its cap before anything else ended it",
+    "mud_cut_off": "the most mud that may come was used up before the face plugged",
 }
-CAKE_BY = {
-    "flow": "the flow of the last update",
-    "network": "the network of the cake",
-    "kozeny": "Carman and Kozeny",
-}
-"""What says the cake's share of the resistance."""
 
 
 def end_words(summary: Mapping[str, Any], control: Run) -> str:
@@ -119,10 +114,12 @@ def end_words(summary: Mapping[str, Any], control: Run) -> str:
         return ENDS[reason]
     if control.stop_rate is not None and rate is not None and rate <= control.stop_rate:
         return f"the rate of flow fell below {percent(control.stop_rate)} % of the first"
+    most = "no fine"
     if control.plug_rate:
         most = f"at most {percent(control.plug_rate)} % of the fines of the undisturbed mud"
+    if rate is None:
         return f"the face plugged: {most} crossed it for the set time"
-    return "the face plugged: no fine crossed it for the set time"
+    return f"the face plugged: {most} entered or left for the set time, and those inside rest"
 
 
 def in_place_words(counts: Mapping[str, int]) -> str:
@@ -140,19 +137,14 @@ def in_place_words(counts: Mapping[str, int]) -> str:
 
 def cake_words(summary: Mapping[str, Any]) -> str:
     """How the cake lets the fluid through; `summary` has the keys of `cake_summary`."""
-    table = summary.get("cake_by_depth")
-    if table is None:
-        return "no fine upstream touches the pack"
-    k, network, own = table["k_kozeny_m2"], table["k_network_m2"], table["too_thin"]
-    if k is not None:
-        porosity = f"at a porosity of {table['porosity']:.2f}"
-        own = f"{in_millidarcy(k)} mD by Carman and Kozeny {porosity}"
-    if network is not None:
-        own += f", {in_millidarcy(network)} mD by its own network"
-    return (
-        f"{table['fines']} fines, {own}; about {percent(summary['cake_resistance_share'])} % of "
-        f"the resistance of cake and specimen by {CAKE_BY[table['share_by']]}"
+    cake, share = summary["cake"], percent(summary["cake_resistance_share"])
+    if cake is None:
+        return "no cake yet: no fine stands before the face"
+    own = cake["no_cake_yet"] or (
+        f"{in_millidarcy(cake['k_m2'])} mD by Beetstra's law of drag at a porosity of "
+        f"{cake['porosity']:.2f}"
     )
+    return f"{cake['fines']} fines, {own}; {share} % of the resistance of cake and specimen"
 
 
 def answer_sentence(summary: Mapping[str, Any]) -> str:
@@ -173,9 +165,12 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
         two_digits(damage["lost_from"]),
     )
     if summary["final"] is False:
+        cut, more = "the run was cut at its cap", "raise run.cap_ms"
+        if summary["stop_reason"] == "mud_cut_off":
+            cut, more = "the mud was cut off", "give a longer fines.slab_mm"
         return (
-            f"So far {p95}, but the run was cut at its cap and this is not final: raise "
-            "run.cap_ms and run it again (--force) before you use these numbers."
+            f"So far {p95}, but {cut} and this is not final: {more} and run it again (--force) "
+            "before you use these numbers."
         )
     if not damage["zone_depth_m"]:
         return f"{p95}, and no layer loses {limit} of its permeability: the damage is negligible."
@@ -338,7 +333,11 @@ def summary_lines(summary: Mapping[str, Any]) -> Iterator[str]:
                 f"({rule['limit']})"
             )
         yield ""
-    yield from (f"warning: {warning}" for warning in summary["warnings"])
+    warnings = summary["warnings"]
+    for warning in warnings[:SHOWN]:
+        yield from textwrap.wrap(f"warning: {warning}", WIDTH, subsequent_indent="    ")
+    if (more := len(warnings) - SHOWN) > 0:
+        yield f"{more} more warning{'s' if more > 1 else ''} in report.html and summary.json"
 
 
 def seconds_line(summary: Mapping[str, Any]) -> str:

@@ -1,37 +1,66 @@
 """The cake and the filtrate.
 
-The external cake: porosity and permeability by depth, and its share of the resistance.
+The external cake: its fines, its porosity by depth, and its share of the resistance. The
+resistance of a bed of thickness h and permeability k is h / k, 1/m; that of layers in series is
+their sum. Each fine of a cake at rest resists the superficial velocity U by its drag,
 
-The resistance of a bed of thickness h and permeability k is h / k, 1/m; that of slices in series
-is their sum. k comes from the network of the cake's own spheres where there are enough of them,
-and from Carman's and Kozeny's eps^3 d^2 / (180 (1 - eps)^2) of each slice in any case. Their
-constant is that of packed beds: the permeability of a cake is that of its packed slices, and a
-cake with too few of these has none.
+    F_i = 6 pi mu r_i Y_i F(phi_i) / phi_i U,    R = sum(F_i) / (mu U A),
+
+by the law of Beetstra, van der Hoef and Kuipers (`fdnet.scales.drag`), with the porosity phi_i of
+the pack and the cake around it. The flow that follows the deposit takes the same sum. It is
+within 15 % of resolved flow (docs/physics_network.md, section 10).
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fdnet.errors import FlowError, NetworkError
-from fdnet.network.specimen import cake_of
-from fdnet.network.states import Log, Sides, cut_out, measure_all_spheres
-from fdnet.scales.flow import carman_kozeny
+from fdnet.network.fines.crowding import REACH, local_porosity
+from fdnet.network.specimen import cake_of, cake_thickness
+from fdnet.scales.drag import Crowd, crowd_drag_factor
 from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
-ENOUGH, THICK = 100, 3.0
-"""Fewest fines of a cake that a network resolves, and least thickness in mean diameters of one
-that has a permeability."""
-MOST = 20_000
-"""Most fines of a cake that is resolved: the network of more takes minutes."""
+THICK = 3.0
+"""Least thickness in mean diameters of a cake that has a permeability."""
 PACKED = 0.7
-"""Porosity up to which a slice is a packed bed: above it Carman's and Kozeny's constant of 5 is
-low by more than a sixth (5.8 for spheres at 0.7, 7.2 at 0.8, 11.3 at 0.9; Happel and Brenner 1965,
-Low Reynolds number hydrodynamics, table 8-4.2)."""
+"""Porosity up to which a slice is packed: looser ones are the heaps on top of a cake."""
+LAW = "beetstra"
+"""The law of a cake's resistance, as summary.json names it."""
+
+
+class Standing(NamedTuple):
+    """The fines of a cake, and what each resists.
+
+    Attributes:
+        fines: N fines.
+        resistance: (N,) 1/m of each; of the cake it is their sum.
+        thickness: m, from the face to the foremost fine.
+    """
+
+    fines: Snapshot
+    resistance: Array
+    thickness: float
+
+
+def standing_cake(spheres: Snapshot, periodic: Sequence[bool]) -> Standing:
+    """The fines of `spheres` that stand before the face, and their resistance."""
+    low, fines = float(spheres.box[0, 0]), cake_of(spheres, periodic)
+    if not len(fines):
+        return Standing(fines, np.zeros(0), 0.0)
+    reach = REACH * float(fines.radius.max()) + float(spheres.radius.max())
+    x = spheres.position[:, 0]
+    around = spheres.where((x >= low) & (x < low + reach)).joined(fines)
+    near = local_porosity(around, (False, bool(periodic[1]), bool(periodic[2])))
+    own = slice(len(near.porosity) - len(fines), None)
+    porosity = near.porosity[own]
+    crowd = Crowd(porosity=porosity, size_ratio=near.size_ratio[own])
+    drag = 6.0 * np.pi * fines.radius * crowd_drag_factor(crowd) / porosity
+    area = float(np.prod(np.ptp(spheres.box[1:], axis=1)))
+    return Standing(fines, drag / area, cake_thickness(fines))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -43,18 +72,14 @@ class Cake:
         count: (B,) number of fines centred in the slice.
         porosity: (B,) void over volume.
         diameter: (B,) m, Sauter mean of these fines.
-        k_kozeny: (B,) m2, by Carman and Kozeny; inf in an empty slice, too high in a loose one.
-        k_network: (B,) m2, in place in the network of the cake; None where it is not resolved.
-        unresolved: why not, in words; "" where it is.
+        resistance: (B,) 1/m.
     """
 
     edges: Array
     count: Array
     porosity: Array
     diameter: Array
-    k_kozeny: Array
-    k_network: Array | None
-    unresolved: str
+    resistance: Array
 
     __repr__ = one_line
 
@@ -65,7 +90,7 @@ class Cake:
 
     @property
     def packed(self) -> Array:
-        """(B,) whether the slice is a packed bed."""
+        """(B,) whether the slice is packed."""
         return self.porosity <= PACKED
 
     @property
@@ -74,92 +99,56 @@ class Cake:
         return float(np.sum(np.diff(self.edges)[self.packed]))
 
     @property
-    def packed_permeability(self) -> float | None:
-        """By Carman and Kozeny, m2, of the packed slices in series; None where `too_thin`."""
-        if self.too_thin:
-            return None
-        resistance = np.sum((np.diff(self.edges) / self.k_kozeny)[self.packed])
-        return self.packed_thickness / float(resistance)
+    def packed_porosity(self) -> float:
+        """Of the packed slices together; of all where none is."""
+        which = self.packed if self.packed.any() else np.ones(len(self.count), bool)
+        return float(np.average(self.porosity[which], weights=np.diff(self.edges)[which]))
 
     @property
-    def too_thin(self) -> str:
-        """Why the cake has no permeability of its own, in words; "" where it has one."""
+    def permeability(self) -> float | None:
+        """Of the packed slices in series, m2; None where there is `no_cake_yet`."""
+        if self.no_cake_yet:
+            return None
+        return self.packed_thickness / float(np.sum(self.resistance[self.packed]))
+
+    @property
+    def no_cake_yet(self) -> str:
+        """Why these fines are no cake with a permeability of its own; "" where they are."""
         layers = self.packed_thickness / float(np.average(self.diameter, weights=self.count))
         if layers >= THICK:
             return ""
         if not self.packed.any():
-            return "loose all through, without a permeability of its own"
-        return (
-            f"packed for {layers:.1f} diameters of a fine, too thin for a permeability of its own "
-            f"({THICK:g} are needed)"
-        )
-
-    def resistance(self, permeability: Array) -> float:
-        """Of the slices in series, 1/m."""
-        with np.errstate(divide="ignore"):
-            return float(np.sum(np.diff(self.edges) / permeability))
+            return f"no cake yet: loose all through, at a porosity of {self.packed_porosity:.2f}"
+        return f"no cake yet: packed for {layers:.1f} diameters of a fine, {THICK:g} are needed"
 
 
-def measure_cake(spheres: Snapshot, sides: Sides) -> Cake | None:
-    """The cake of `spheres`, grains and fines; None where no fine upstream touches the pack."""
+def measure_cake(spheres: Snapshot, periodic: Sequence[bool]) -> Cake | None:
+    """The cake of `spheres`, grains and fines; None where no fine stands before the face."""
     face = float(spheres.box[0, 0])
-    cake = cake_of(spheres, sides.periodic)
+    cake, resistance, thickness = standing_cake(spheres, periodic)
     if not len(cake):
         return None
-    thickness = face - float(np.min(cake.position[:, 0] - cake.radius))
-    mean = 2.0 * float(np.mean(cake.radius))
-    slices = max(1, math.ceil(thickness / mean - 0.5))
+    slices = max(1, math.ceil(thickness / (2.0 * float(np.mean(cake.radius))) - 0.5))
     edges = face - thickness * np.linspace(1.0, 0.0, slices + 1)
     edges[-1] = face
-    reaching = spheres.where(spheres.position[:, 0] >= face).joined(cake)
-    bed = cut_out(reaching, (float(edges[0]), face), (False, *sides.periodic[1:]))
-    porosity = measure_porosity(bed, periodic=sides.periodic, edges=edges).profile
+    bed = spheres.where(spheres.position[:, 0] >= face).joined(cake)
+    bed = replace(bed, box=np.array([edges[[0, -1]], *bed.box[1:]]))
+    sides = (False, bool(periodic[1]), bool(periodic[2]))
     where = np.clip(np.searchsorted(edges, cake.position[:, 0], "right") - 1, 0, slices - 1)
     cube, square = (np.bincount(where, cake.radius**power, slices) for power in (3, 2))
     diameter = np.full(slices, float(np.sum(cake.radius**3) / np.sum(cake.radius**2)))
-    diameter = 2.0 * np.divide(cube, square, out=diameter, where=square > 0)
-    resolved, unresolved = _resolved(bed, edges, sides, fines=len(cake), layers=thickness / mean)
-    kozeny = [
-        carman_kozeny(void, d) if void < 1.0 else math.inf
-        for void, d in zip(porosity, diameter, strict=True)
-    ]
     return Cake(
         edges=edges,
         count=np.bincount(where, minlength=slices),
-        porosity=porosity,
-        diameter=diameter,
-        k_kozeny=np.array(kozeny),
-        k_network=resolved,
-        unresolved=unresolved,
+        porosity=measure_porosity(bed, periodic=sides, edges=edges).profile,
+        diameter=2.0 * np.divide(cube, square, out=diameter, where=square > 0),
+        resistance=np.bincount(where, resistance, slices),
     )
-
-
-def _resolved(
-    bed: Snapshot, edges: Array, sides: Sides, *, fines: int, layers: float
-) -> tuple[Array | None, str]:
-    """Permeability (B,) m2 of the slices in place in the network of the bed, or why not."""
-    missed = []
-    if fines < ENOUGH:
-        missed.append(f"has {fines} fines, and a network needs {ENOUGH}")
-    if fines > MOST:
-        missed.append(f"has {fines} fines, and a network takes {MOST}")
-    if layers < THICK:
-        missed.append(f"is {layers:.1f} diameters of a fine thick, and a network needs {THICK:g}")
-    if missed:
-        return None, f"the cake {' and '.join(missed)}"
-    around = replace(sides, periodic=(False, *sides.periodic[1:]))
-    try:
-        state = measure_all_spheres(bed, edges[[0, -1]], sides=around, log=Log()).state
-    except (NetworkError, FlowError) as error:
-        return None, f"the cake makes no network: {error}"
-    from fdnet.network.flow.sections import inplace_permeability
-
-    return inplace_permeability(state.network, state.flow, edges, state.halves), ""
 
 
 def cake_rows(cake: Cake) -> list[dict[str, Any]]:
     """The slices as cake.csv names their values, from the face outwards."""
-    order = range(len(cake.count))[::-1]
+    width = np.diff(cake.edges)
     return [
         {
             "x_lo_m": float(cake.edges[i]),
@@ -167,64 +156,30 @@ def cake_rows(cake: Cake) -> list[dict[str, Any]]:
             "fines_count": int(cake.count[i]),
             "porosity": float(cake.porosity[i]),
             "sauter_diameter_m": float(cake.diameter[i]),
-            "k_kozeny_m2": float(cake.k_kozeny[i]) if cake.packed[i] else None,
-            "k_network_m2": None if cake.k_network is None else float(cake.k_network[i]),
+            "k_m2": float(width[i] / cake.resistance[i]) if cake.count[i] else None,
         }
-        for i in order
+        for i in reversed(range(len(cake.count)))
     ]
 
 
-def resistance_share(cake: float, pack: float) -> float:
-    """R_cake / (R_cake + R_pack) of two beds in series; 0 where the pack lets nothing through."""
-    return cake / (cake + pack) if math.isfinite(pack) else 0.0
-
-
-def cake_summary(
-    cake: Cake | None, pack: float, *, flow: float | None = None
-) -> Mapping[str, Any]:
-    """The keys that the cake adds to summary.json; `pack` is the resistance of the pack, 1/m.
-
-    `flow` is the cake's share of the resistance by the flow itself, where that follows the
-    deposit; else the share is by the network of the cake, or by Carman and Kozeny.
-    """
+def cake_summary(cake: Cake | None, pack: float) -> Mapping[str, Any]:
+    """The keys that the cake adds to summary.json; `pack` is the resistance of the pack, 1/m."""
     if cake is None:
-        return {"cake_resistance_share": flow or 0.0, "cake": None}
-    kozeny, k, packed = cake.resistance(cake.k_kozeny), cake.packed_permeability, cake.packed
-    network = None if cake.k_network is None else cake.resistance(cake.k_network)
-    thick = np.diff(cake.edges)[packed]
-    porosity = float(np.average(cake.porosity[packed], weights=thick)) if packed.any() else None
-    shares = {
-        "flow": flow,
-        "network": None if network is None else resistance_share(network, pack),
-        "kozeny": resistance_share(kozeny, pack),
-    }
-    by = next(name for name, share in shares.items() if share is not None)
-    table = {
-        "fines": int(cake.count.sum()),
-        "slices": len(cake.count),
-        "packed_thickness_m": cake.packed_thickness,
-        "porosity": porosity,
-        "k_kozeny_m2": k,
-        "k_network_m2": cake.thickness / network if network else None,
-        "resistance_kozeny_1_m": kozeny,
-        "resistance_network_1_m": network,
-        "resistance_pack_1_m": pack if math.isfinite(pack) else None,
-        "share_kozeny": shares["kozeny"],
-        "share_network": shares["network"],
-        "share_by": by,
-        "unresolved": cake.unresolved,
-        "too_thin": cake.too_thin,
-    }
-    bed = {
-        "thickness_m": cake.thickness,
-        "porosity": porosity,
-        "k_carman_kozeny_m2": k,
-        "resistance_1_m": kozeny,
-    }
+        return {"cake_resistance_share": 0.0, "cake": None}
+    own, k = float(cake.resistance.sum()), cake.permeability
     return {
-        "cake_resistance_share": shares[by],
-        "cake_by_depth": table,
-        "cake": None if k is None else bed,
+        "cake_resistance_share": own / (own + pack),
+        "cake": {
+            "fines": int(cake.count.sum()),
+            "thickness_m": cake.thickness,
+            "packed_thickness_m": cake.packed_thickness,
+            "porosity": cake.packed_porosity,
+            "k_m2": k,
+            "law": LAW,
+            "resistance_1_m": own,
+            "resistance_pack_1_m": pack if math.isfinite(pack) else None,
+            "no_cake_yet": cake.no_cake_yet,
+        },
     }
 
 

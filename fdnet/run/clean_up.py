@@ -1,6 +1,6 @@
 """The stage clean_up of a run: the flow is turned back, and what it gives is measured."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from fdnet.dem.clean_up import CleanUpStage, Start, clean_up, fines_inside
 from fdnet.dem.invade_deck import DrivingFluid
 from fdnet.errors import explained
 from fdnet.run.dem_stages import invaded, is_done, packed_grains
-from fdnet.run.fluid import Mirrored, UniformCrowd, fluid_of, mirrored
+from fdnet.run.fluid import Mirrored, fluid_of, mirrored
 from fdnet.run.folder import RECORD_FORMAT, START_OVER, check_files, digests_of
 from fdnet.run.progress import Progress
 from fdnet.run.records import Session, run_record
@@ -66,8 +66,6 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
 def fluid_turned_back(flow: BackFlow, grains: Snapshot) -> DrivingFluid | None:
     """The fluid of a coupled clean-up, turned back."""
     fluid = fluid_of(flow.case, flow.scales, mirrored(grains))
-    if isinstance(fluid, UniformCrowd):
-        fluid = replace(fluid, mud_beyond=True)
     return None if fluid is None else Mirrored(fluid=fluid)
 
 

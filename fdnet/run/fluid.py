@@ -1,12 +1,9 @@
-"""The fluid that drives the fines: uniform with drag in a crowd, or by the network.
+"""The fluid of `drag.field` = "network": it follows the deposit, and the deposit follows it.
 
-In the uniform field the superficial slip is u - v, and the force on a fine
-
-    F = 6 pi mu r M Y F_b / phi (u - v) + V G,
-
-with Beetstra's factor F_b of the porosity phi around the fine and the size factor Y
-(`fdnet.scales.drag`); G is the gradient of the intact pack. docs/physics.md, "Drag in a crowd",
-tells why the two gradients add and none is counted twice.
+The drag on a fine at the superficial slip u - v is 6 pi mu r M Y F_b / phi (u - v), with
+Beetstra's factor F_b of the porosity phi around it and the size factor Y (`fdnet.scales.drag`).
+The forces, the rate, and what happens when a standing fine comes loose are derived on
+docs/physics.md, "The field of the network".
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,6 +20,7 @@ from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
 from fdnet.network.field.field import VelocityField
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
+from fdnet.run.cake import standing_cake
 from fdnet.run.network_flow import (
     RENEWED,
     Carried,
@@ -41,51 +39,10 @@ CROWD_COLUMNS = ("factor_mean", "factor_most", "porosity_least", "porosity_cappe
 """Mean and largest factor on the drag, least porosity, fines whose porosity was capped."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class UniformCrowd:
-    """The uniform field, with drag by the crowd around each fine.
-
-    Attributes:
-        case: what is run.
-        scales: of the case.
-        mud_beyond: whether the mud is at the other end: that of a clean-up, mirrored.
-    """
-
-    case: InvasionCase
-    scales: InvasionScales
-    mud_beyond: bool = False
-
-    @property
-    def measured(self) -> tuple[str, ...]:
-        """What a row of the record holds."""
-        return CROWD_COLUMNS
-
-    def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
-        """What acts on the fines of `spheres`, in their order."""
-        fines, scales = spheres.fines(), self.scales
-        depth, length = fines.position[:, 0], self.case.size_m[0]
-        velocity, push = np.zeros((2, len(fines), 3))
-        mud = depth > length if self.mud_beyond else depth < 0
-        velocity[:, 0] = np.where(mud, scales.upstream_velocity, scales.drive_velocity)
-        volume = 4.0 / 3.0 * np.pi * fines.radius**3
-        within = (depth >= 0) & (depth < length)
-        push[:, 0] = np.where(within, volume * scales.push.gradient, 0.0)
-        near = local_porosity(spheres, self.case.periodic)
-        factor = crowd_factor(scales, near, fines.radius, _speed(velocity - fines.velocity))
-        return FluidForces(
-            coefficient=scales.push.coefficient * fines.radius * factor,
-            velocity=velocity,
-            push=push,
-            pace=scales.drive_velocity,
-            measures=crowd_measures(factor, near),
-        )
-
-
 def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, slip: Array) -> Array:
     """Factor (N,) on the drag of lone fines of `radius` m and superficial `slip` m/s.
 
-    It is the total force in the crowd, Y F_b / phi. The Reynolds number is 0 unless the case asks
-    for drag at finite ones.
+    It is the total force in the crowd, Y F_b / phi.
     """
     reynolds = scales.push.reynolds_slope * radius / near.size_ratio * slip
     crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
@@ -281,10 +238,7 @@ def history_rows(
 
 
 # ------------------------------------------------------------------------------------------------
-# The fluid of `drag.field` = "network": it follows the deposit, and the deposit follows it.
-#
-# The forces, the rate, and what happens when a standing fine comes loose are derived on
-# docs/physics.md, "The field of the network".
+# The fluid: velocity, drag and pressure on each fine, and the rate of flow.
 
 
 STANDING = 0.5
@@ -375,10 +329,8 @@ class NetworkFluid:
         near = local_porosity(spheres, self.case.periodic)
         share = pack.share_at(fines.position, carried)
         shape = intact.velocity * share[:, None]
-        factor = np.ones(len(fines))
-        if self.case.drag.crowd != "none":
-            slip = _speed(before * shape - fines.velocity)
-            factor = crowd_factor(scales, near, fines.radius, slip)
+        slip = _speed(before * shape - fines.velocity)
+        factor = crowd_factor(scales, near, fines.radius, slip)
         crowd, goes = lone * factor, ~standing
         density = self.case.fines.density_kg_m3 if moment.density is None else moment.density
         rate = drag_rate(fines, crowd, density)
@@ -388,8 +340,13 @@ class NetworkFluid:
         order = np.argsort(fines.id)
         rows = order[np.searchsorted(fines.id[order], deposit.fines.id)]
         pressed[rows] = on_each_fine(carried.pressed, deposit)
-        held, caked = standing & within & np.any(pressed != 0.0, axis=1), standing & (depth < 0)
-        cake = float(crowd[caked] @ shape[caked, 0]) / pack.network.area
+        held = standing & within & np.any(pressed != 0.0, axis=1)
+        stack = standing_cake(spheres, self.case.periodic)
+        cake = scales.push.coefficient / (6.0 * np.pi) * float(stack.resistance.sum())
+        # the pack's own flow knows no cake: the forces on its fines add up to its pressure drop
+        caked = standing & np.isin(fines.id, stack.fines.id)
+        drawn = float(crowd[caked] @ shape[caked, 0])
+        shape[caked] *= cake * pack.network.area / drawn if drawn > 0 else 1.0
         moving = np.where(within & ~held, crowd, 0.0) / pack.network.area
         slow, gain = float(moving @ shape[:, 0]), float(moving @ fines.velocity[:, 0])
         speed = self._velocity(carried, cake + slow, gain)
@@ -414,7 +371,6 @@ class NetworkFluid:
         on_fines = float(drag[within].sum()) + float(pressed[outside, 0].sum())
         on_grains, on_held = drop * float(carried.pressed.grains[0]), float(pressed[held, 0].sum())
         whole, law = (drop + loose) * pack.network.area, float(crowd[held] @ fluid[held, 0])
-        dense = float(np.mean(1.0 - near.porosity[caked])) if caked.any() else 0.0
         # rates and pressures are those of the fluid itself, which is slower than a driven one
         driven, filtrate = scales.force_factor, 0.0
         if moment.before is not None:
@@ -437,7 +393,7 @@ class NetworkFluid:
                 "momentum_defect": _over(abs(on_fines + on_grains - whole), whole),
                 "fines_share": _over(on_held, whole),
                 "crowd_over_network": _over(law, on_held),
-                "cake_thickness_m": _over(float(np.sum(volume[caked])), pack.network.area * dense),
+                "cake_thickness_m": stack.thickness,
                 "pores_stagnant": carried.stagnant,
                 "fines_standing": int(np.sum(standing & within)),
             },
@@ -492,6 +448,4 @@ def _over(part: float, whole: float) -> float:
 
 def fluid_of(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> DrivingFluid | None:
     """The fluid of a coupled case; None where the deck holds the forces itself."""
-    if case.drag.field == "network":
-        return NetworkFluid(case=case, scales=scales, grains=grains)
-    return UniformCrowd(case=case, scales=scales) if case.drag.coupled else None
+    return NetworkFluid(case=case, scales=scales, grains=grains) if case.drag.coupled else None

@@ -14,7 +14,6 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.dem.checkpoint import readable_states
 from fdnet.dem.supply import batches_of, drawn_fines
-from fdnet.network.states import Sides
 from fdnet.report import figures, tables, vtk
 from fdnet.report.figures import Added, PageTable, PlacedSizes
 from fdnet.report.picture import render_spheres_png
@@ -23,7 +22,6 @@ from fdnet.report.text import cake_words
 from fdnet.run.bridging import CLOGGED, ratio_rows
 from fdnet.run.cake import (
     HALF_HOUR,
-    PACKED,
     cake_rows,
     cake_share,
     cake_summary,
@@ -233,8 +231,7 @@ _CAKE_COLUMNS = (
     ("fines_count", "fines", "", None),
     ("porosity", "porosity", "–", 1),
     ("sauter_diameter_m", "Sauter diameter", "mm", 1e3),
-    ("k_network_m2", "k by the network", "mD", 1),
-    ("k_kozeny_m2", "k by Carman and Kozeny", "mD", 1),
+    ("k_m2", "k", "mD", 1),
 )
 
 
@@ -253,27 +250,25 @@ def with_added(results: Results, record: dict[str, Any] | None) -> Results:
 def _cake(results: Results, one: FinishedInvasion) -> Added:
     """The external cake by depth, and its share of the resistance."""
     case, analysis = one.case, results.analysis
-    cake = measure_cake(one.damaged, Sides(periodic=case.periodic, walls=case.analysis.walls))
+    cake = measure_cake(one.damaged, case.periodic)
     pack = case.size_m[0] / analysis.k_damaged if analysis.k_damaged > 0 else np.inf
-    summary = cake_summary(cake, pack, flow=cake_share(one.updates))
+    summary = cake_summary(cake, pack)
     if cake is None:
         return Added(name="cake", summary=summary)
     rows = cake_rows(cake)
-    said = [cake_words(summary), *filter(None, [cake.unresolved])]
     return Added(
         name="cake",
         rows=rows,
         summary=summary,
         fill=partial(figures.fill_cake, rows=rows),
         caption="The external cake in slices of a fine's diameter: porosity, and permeability by "
-        "the network of its own spheres and, of packed slices, by Carman and Kozeny.",
+        "the law of Beetstra and others for the drag on spheres in a bed.",
         page=PageTable(
             title="External cake",
             columns=_CAKE_COLUMNS,
             rows=rows,
-            note=f"The cake is {millimetres(cake.thickness)} thick: {'; '.join(said)}. Carman's "
-            f"and Kozeny's formula is for packed beds: slices of a porosity above {PACKED:g} are "
-            "loose and have a dash.",
+            note=f"The cake is {millimetres(cake.thickness)} thick: {cake_words(summary)}. It is "
+            "the fines that stand before the face, each held by two others or more.",
         ),
     )
 

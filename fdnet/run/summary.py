@@ -6,7 +6,7 @@ import numpy as np
 
 from fdnet.case.case import Case
 from fdnet.dem.checkpoint import Checkpoint
-from fdnet.errors import explained
+from fdnet.errors import by_importance, explained
 from fdnet.report.tables import section_rows
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def summarise(
         "invasion_depth_p95_m": analysis.invasion_depth_p95,
         "cake_thickness_m": analysis.cake_thickness,
         "stop_reason": stop,
-        "final": stop != "cap" if invasion else None,
+        "final": stop not in ("cap", "mud_cut_off") if invasion else None,
         "sections": section_rows(analysis),
         "pores": len(network.pore_radius),
         "throats": len(network.throat_radius),
@@ -85,7 +85,7 @@ def summarise(
         "seconds": seconds
         | {f"analyse_{name}": value for name, value in analysis.seconds.items()},
         "left_out": left_out,
-        "warnings": [explained(one) for one in [*warnings, *analysis.warnings]],
+        "warnings": by_importance(explained(one) for one in [*warnings, *analysis.warnings]),
     }
 
 

@@ -151,6 +151,7 @@ def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Fin
         length = TAKEN_SOLIDS / solids * scales.slab_length
         by_time = scales.cap_time < feeding
         key = "fines.count" if fines.count is not None else "fines.slab_mm"
+        key = "fines" if fines.endless else key  # so many of them that the mud is cut off
         yield Finding(
             key="run.cap_ms" if by_time else key,
             what=f"the fines that come would fill {come:.2g} of a median grain's depth; the "

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS
+from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS, MOST_SLAB
 from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import Contact, contacts_of, overlaps_of, two_digits_up
-from fdnet.scales.drag import Crowd, crowd_drag_factor, push_of
+from fdnet.scales.drag import BRIDGING, Crowd, crowd_drag_factor, push_of, throat_width
 from fdnet.scales.flow import (
     Drive,
     Velocity,
@@ -27,6 +27,10 @@ TAKEN_SOLIDS = 0.25
 """The same, of what has come when the face plugs."""
 FIRST_BATCHES = 0.3
 """Share of the slab that is there before it is needed, where it comes in batches."""
+MUD_SOLIDS, MUD_PORES, MUD_FINES = 10 * TAKEN_SOLIDS, 5.0, 200_000
+"""Where neither `fines.count` nor `fines.slab_mm` is given the mud comes until the stop rule, but
+no more than ten times the solids that plugged the shipped cases. Fines that are too small to
+bridge end after five volumes of the pores, and no mud has more fines than the last number."""
 
 
 def supplied_solids(case: InvasionCase, slab: float) -> float:
@@ -38,10 +42,12 @@ def present_share(case: InvasionCase, *, duration: float, feeding: float) -> flo
     """Mean number of fines in the simulation over the number supplied.
 
     The slab arrives evenly over `feeding` s of a simulation of `duration` s, in batches that come
-    ahead of what arrives.
+    ahead of what arrives. Mud without an end comes in short batches: what is there has arrived.
     """
     if case.fines.supply == "slab":
         return 1.0
+    if case.fines.endless:
+        return min(1.0, 0.5 * duration / feeding)
     full = (1 - FIRST_BATCHES) * feeding
     if duration <= full:
         return FIRST_BATCHES + 0.5 * (1 - FIRST_BATCHES) * duration / full
@@ -89,20 +95,35 @@ class Slab:
     length: float
 
 
-def slab_of(case: InvasionCase) -> Slab:
+def slab_of(case: InvasionCase, throat_ratio: float) -> Slab:
     """Number of fines n and length l of the slab, n v = c A l.
 
     v is the mean volume of a fine, c the share by volume of the fines that are placed, A the
-    cross-section of the box. A case gives either n or l.
+    cross-section of the box. A case gives n, l or neither; then the slab is the most mud that may
+    come (`MUD_SOLIDS`). `throat_ratio` is that of the largest fine to the throats.
     """
     fines = case.fines
     area, volume = case.size_m[1] * case.size_m[2], fines.mean_volume_m3
+    if fines.endless:
+        return _most_mud(case, throat_ratio)
     least = 2 * fines.radius_range_m[1]
     if fines.count is not None:
         length = max(fines.count * volume / (fines.placed_fraction * area), least)
         return Slab(count=fines.count, length=length)
     length = max(fines.slab_m or 0.0, least)
     return Slab(count=max(1, round(fines.placed_fraction * area * length / volume)), length=length)
+
+
+def _most_mud(case: InvasionCase, throat_ratio: float) -> Slab:
+    """The slab of mud that comes until the stop rule; its last fine is that of the bound."""
+    share, area = case.fines.placed_fraction, case.size_m[1] * case.size_m[2]
+    length = MUD_SOLIDS * case.grains.curve.size_at(0.5) / share
+    if throat_ratio < BRIDGING:
+        length = min(length, MUD_PORES * target_porosity(case) * case.size_m[0])
+    per_length = share * area / case.fines.mean_volume_m3
+    length = max(length, 2 * case.fines.radius_range_m[1], ARRIVALS / per_length)
+    length = min(length, MUD_FINES / per_length, MOST_SLAB * case.size_m[0])
+    return Slab(count=max(1, round(per_length * length)), length=length)
 
 
 def arrival_time(case: InvasionCase, upstream: float) -> float:
@@ -299,14 +320,6 @@ def hold_steps(case: Case, step: float, tau: float, longest: float) -> int:
     return given
 
 
-def densest_factor(case: Case) -> float:
-    """Factor on the drag of a fine in a random close packing of fines; 1 without a crowd."""
-    if case.drag.crowd == "none":
-        return 1.0
-    crowd = Crowd(porosity=RANDOM_CLOSE)
-    return float(crowd_drag_factor(crowd)) / RANDOM_CLOSE
-
-
 def drag_warnings(case: Case, held: float) -> list[Doubt]:
     """What a drag that is constant for `held` tau costs in accuracy, in words.
 
@@ -388,7 +401,8 @@ def deposit_pressure(case: InvasionCase, flow: Velocity, porosity: float) -> flo
         given = None if case.well is None else case.well.formation_permeability_m2
         way, inside = path_of(case).viscous, min(length, path_of(case).viscous)
         way = inside + (way - inside) * flow.permeability / (given or flow.permeability)
-    mud = [slab_of(case).length]
+    throat = 2 * fines.radius_range_m[1] / throat_width(porosity, flow.permeability)
+    mud = [slab_of(case, throat).length]
     lasts = run.duration_s or run.cap_s
     mud += [] if lasts is None else [lasts * flow.darcy]
     mud += [] if run.stop_pore_volumes is None else [run.stop_pore_volumes * porosity * length]

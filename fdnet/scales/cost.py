@@ -30,9 +30,9 @@ FINE_SECONDS = {"held": 1.4e-7, "implicit": 1.4e-7, "viscous": 1.35e-7}
 CACHED_FINES = 8000
 """Fines n cost (1 + n / (n + CACHED_FINES)) times as much each: their neighbours leave the
 cache."""
-UPDATE_SECONDS = {"network": (0.03, 9.0e-5), "uniform": (0.004, 1.4e-5)}
-"""Seconds of one update of the forces that fdnet computes itself, by `drag.field`: at least, and
-for each grain and fine."""
+UPDATE_SECONDS = (0.03, 9.0e-5)
+"""Seconds of one update of the flow that follows the deposit: at least, and for each grain and
+fine."""
 FALLING_RATE = 0.6
 """Mean rate over the first, where the deposit slows the flow."""
 WAITING, TRICKLING = 2.0, 1.4
@@ -84,10 +84,9 @@ def cost_of(case: Case, scales: Scales) -> Cost:
     fines = scales.supplied_count * present_share(case, duration=duration, feeding=feeding)
     updates = 0.0
     if drag.coupled:  # the travel of the fluid over that of one update
-        falling = FALLING_RATE if drag.field == "network" else 1.0
-        way = falling * scales.drive_velocity * duration
+        way = FALLING_RATE * scales.drive_velocity * duration
         count = way / (drag.travel_diameters * 2 * case.fines.radius_range_m[0])
-        least, each = UPDATE_SECONDS[drag.field]
+        least, each = UPDATE_SECONDS
         updates = count * (least + each * (grains + fines))
     grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
     fine = FINE_SECONDS[drag.scheme] * (1 + fines / (fines + CACHED_FINES))
@@ -121,19 +120,26 @@ def expected_duration(case: InvasionCase, scales: InvasionScales) -> float:
     return min(scales.cap_time, slower * feeding * min(1.0, share) + watched)
 
 
+def expected_fines(case: Case, scales: Scales) -> float:
+    """Fines supplied; of mud that comes until the stop rule, those that come until then."""
+    if not isinstance(case, InvasionCase) or not isinstance(scales, InvasionScales):
+        return 0
+    come = expected_duration(case, scales) * scales.upstream_velocity / scales.slab_length
+    return scales.supplied_count * (min(1.0, come) if case.fines.endless else 1)
+
+
 def peak_memory(case: Case, scales: Scales) -> float:
     """Memory of the largest process of a run, bytes: that of the report, or of the network.
 
     The network of all spheres takes most, up to the number that it is used for.
     """
-    fines = scales.supplied_count if isinstance(scales, InvasionScales) else 0
-    return REPORT_BYTES + NETWORK_BYTES * min(grain_count(case) + fines, MOST_SPHERES)
+    spheres = grain_count(case) + expected_fines(case, scales)
+    return REPORT_BYTES + NETWORK_BYTES * min(spheres, MOST_SPHERES)
 
 
 def memory_bytes(case: Case, scales: Scales) -> float:
     """Memory of LIGGGHTS."""
-    fines = scales.supplied_count if isinstance(scales, InvasionScales) else 0
-    return 9e6 + BYTES_PER_SPHERE * (grain_count(case) + fines)
+    return 9e6 + BYTES_PER_SPHERE * (grain_count(case) + expected_fines(case, scales))
 
 
 def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = True) -> str:
@@ -163,7 +169,8 @@ def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = 
         remedy = "lower run.stiffness_N_m (the time goes with its square root)"
     return (
         f"{refusal}: {cost.steps:.3g} steps of {scales.time_step:.3g} s ({reason}) with "
-        f"{scales.supplied_count} fines and {grain_count(case)} {case.grains.motion} grains: "
+        f"{expected_fines(case, scales):.0f} fines and {grain_count(case)} {case.grains.motion} "
+        "grains: "
         f"{remedy}, supply fewer fines, shorten run.duration_ms or run.cap_ms, or raise "
         "run.max_hours"
     )

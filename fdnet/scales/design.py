@@ -133,7 +133,7 @@ class Choice:
         sand_cut: percent of the sand left out at the fine end.
         mud_cut: percent of the solids below the coarse cut.
         cut: m, diameter below which solids are left out; 0 for none.
-        slab: m of mud.
+        slab: m of mud; 0 where it comes until the stop rule.
         supply_share: solids supplied over those that are expected to plug the face.
         stiffness: N/m.
         driven: whether the fines are driven faster than the fluid.
@@ -182,7 +182,8 @@ def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
     """The tables of the case file."""
     kept = {"cut_percent": [1.0, choice.mud_cut]} if choice.mud_cut != 99.0 else {}
     sand = {"cut_percent": [choice.sand_cut, 99.0]} if choice.sand_cut != 1.0 else {}
-    known = answers["formation_permeability"]
+    known, outer = answers["formation_permeability"], answers["drainage_radius"]
+    usual = {one.key: one.default for one in QUESTIONS}
     solids = "concentration" if answers["solids"].rstrip().endswith("%") else "solids"
     return {
         "name": answers["name"],
@@ -194,7 +195,7 @@ def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
             **({"cut": um(choice.cut)} if choice.cut else {}),
             solids: answers["solids"],
             "density": answers["solids_density"],
-            "slab": mm(choice.slab),
+            **({"slab": mm(choice.slab)} if choice.slab else {}),
         },
         "fluid": {
             "viscosity": answers["viscosity"],
@@ -203,7 +204,7 @@ def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
         },
         "well": {
             "radius": answers["well_radius"],
-            "drainage_radius": answers["drainage_radius"],
+            **({} if outer == usual["drainage_radius"] else {"drainage_radius": outer}),
             **({"formation_permeability": known} if known else {}),
         },
         "drag": {
@@ -249,7 +250,7 @@ GAP = 0.95
 MOST_COARSE = 0.35
 """Share of the coarsest solids that may be left out."""
 PATIENCE = 1.5
-"""Cap over the expected time, and over that in which all of the mud arrives."""
+"""Cap over the expected time, and over that in which what surely plugs the face arrives."""
 OF_CONTACTS = {"predicted-overlap", "pressure-on-the-deposit", "cohesion", "fines-lock"}
 """Warnings that contacts are too soft, or hold fines."""
 USUAL_SIZES = {"sand_d10": "0.3 mm", "sand_d50": "0.5 mm", "sand_d90": "0.7 mm"}
@@ -262,7 +263,7 @@ USUAL_CHOICE = Choice(
     sand_cut=1.0,
     mud_cut=99.0,
     cut=0.0,
-    slab=1e-3,
+    slab=0.0,
     supply_share=1.0,
     stiffness=STIFFNESSES[-1],
 )
@@ -377,7 +378,7 @@ def _first_choice(answers: Answers, budget: Budget, sand: Sizes, mud: Sizes) -> 
         sand_cut=sand_cut,
         mud_cut=mud_cut,
         cut=0.0,
-        slab=_mud_curve(mud, mud_cut).high,
+        slab=0.0,
         supply_share=1.0,
         stiffness=STIFFNESSES[-1],
         passing=FINEST_OF_THROAT * throat,
@@ -431,8 +432,8 @@ def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> D
 
     case = _case(answers, choice, folder)
     median = case.grains.curve.size_at(0.5)
-    plugs = choice.supply_share * PLUG_SOLIDS * median / case.fines.placed_fraction
-    choice = replace(choice, slab=_up(plugs))
+    plugs = _up(choice.supply_share * PLUG_SOLIDS * median / case.fines.placed_fraction)
+    choice = replace(choice, slab=plugs if choice.supply_share < 1.0 else 0.0)
     # the softest contacts whose predicted overlaps stay below run.max_overlap
     for stiffness in STIFFNESSES:
         trial = replace(choice, stiffness=stiffness)
@@ -452,7 +453,7 @@ def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> D
         pass
     case, sized = _case(answers, choice, folder), scales(choice)
     cost = cost_of(case, sized)
-    arrival = sized.slab_length / sized.upstream_velocity
+    arrival = plugs / sized.upstream_velocity
     cap = _up(PATIENCE * max(cost.duration, arrival) * sized.force_factor)
     choice = replace(choice, cap=cap)
     return Design(
@@ -551,11 +552,11 @@ def _notes(design: Design) -> dict[str, str]:
         ),
         "well.radius": (
             "The overbalance is lost in radial flow around the well, from its face to the "
-            f"drainage radius: the mud moves at {scales.interstitial_velocity:.2g} m/s in "
-            "the pores."
+            f"drainage radius ({design.answers['drainage_radius']}): the mud moves at "
+            f"{scales.interstitial_velocity:.2g} m/s in the pores."
         ),
         "fines.sizes": f"The throats of the sand are some {um(throat)} wide.",
-        "fines.slab": _slab_note(design),
+        "fines.slab": _slab_note(design) if choice.slab else "",
         "run.stiffness": (
             "Contacts as soft as they may be: the time of the run goes with the root of it, and "
             f"the predicted overlap is {100 * overlap:.1f} % of a fine."
@@ -614,19 +615,11 @@ def _cut_note(design: Design, throat: float) -> str:
 def _slab_note(design: Design) -> str:
     scales, choice = design.scales, design.choice
     feeding = scales.slab_length / scales.upstream_velocity
-    text = (
+    return (
         f"Length of mud that is supplied: {scales.supplied_count} fines, all of them at the face "
-        f"after {_ms(feeding * scales.force_factor)}. "
-    )
-    if choice.supply_share >= 1.0:
-        return text + (
-            f"They would fill {PLUG_SOLIDS:g} of a median grain's depth, two to six times what "
-            "plugged the shipped specimens."
-        )
-    return text + (
-        f"It is {100 * choice.supply_share:.0f} % of what surely plugs the face, because more "
-        "does not fit the time: if the summary says supply_exhausted, more mud would do more "
-        "damage."
+        f"after {_ms(feeding * scales.force_factor)}. It is {100 * choice.supply_share:.0f} % of "
+        "what surely plugs the face, because more does not fit the time: if the summary says "
+        "supply_exhausted, more mud would do more damage."
     )
 
 

@@ -327,7 +327,7 @@ def reynolds_warnings(
             f": the drag on a fine at rest is {drag_factor(reynolds):.3g} times as large by "
             f'Schiller and Naumann, which matters {matters}; set drag.inertia = "schiller-naumann"'
         )
-        if case.drag.scheme != "held" and not case.drag.coupled:
+        if case.drag.scheme != "held":
             text += ' with drag.scheme = "held"'
     return [Doubt("reynolds-number", text)]
 

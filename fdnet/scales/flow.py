@@ -258,7 +258,8 @@ def impact_stokes(relaxation_time: float, velocity: float, radius: float) -> flo
 def drive_of(case: InvasionCase, velocity: float, relaxation_time: float, free: float) -> Drive:
     """The velocity that the case asks for, or the fluid's own.
 
-    "auto" never drives slower than the fluid moves.
+    "auto" never drives slower than the fluid moves, and not where fines cohere: cohesion is not
+    scaled with the forces of the fluid.
 
     Args:
         case: the case.
@@ -273,18 +274,18 @@ def drive_of(case: InvasionCase, velocity: float, relaxation_time: float, free: 
     """
     asked, driven = case.drag.drive_velocity_m_s, velocity
     own = impact_stokes(relaxation_time, free, case.fines.radius_range_m[1])
-    if asked == "auto":
+    if asked == "auto" and case.contact.cohesion_J_m3 is None:
         driven = velocity * max(1.0, AUTO_STOKES / own)
-    elif asked is not None:
+    elif not isinstance(asked, str):
         driven = asked
-    stokes = own * (driven / velocity)
-    if asked is not None and own > STOKES_LIMIT * _ROUNDING:
+    stokes, given = own * (driven / velocity), not isinstance(asked, str)
+    if given and own > STOKES_LIMIT * _ROUNDING:
         raise CaseError(
             f"drag.drive_velocity_m_s: the impact Stokes number of the fines is {own:.2g} "
             f"in the fluid itself (limit {STOKES_LIMIT:g}), so their inertia matters and no other "
             "velocity gives the same result; leave the key out"
         )
-    if asked is not None and stokes > STOKES_LIMIT * _ROUNDING:
+    if given and stokes > STOKES_LIMIT * _ROUNDING:
         raise CaseError(
             f"drag.drive_velocity_m_s: {driven:g} m/s makes the impact Stokes number "
             f"{stokes:.2g} (limit {STOKES_LIMIT:g}): the fines' inertia would "
@@ -295,7 +296,8 @@ def drive_of(case: InvasionCase, velocity: float, relaxation_time: float, free: 
 
 def drive_warnings(case: InvasionCase, drive: Drive) -> list[Doubt]:
     """A driven case in which inertia may begin to matter; empty when it does not."""
-    if case.drag.drive_velocity_m_s is None or drive.impact_stokes <= STOKES_WARNING * _ROUNDING:
+    asked = case.drag.drive_velocity_m_s
+    if isinstance(asked, str) or drive.impact_stokes <= STOKES_WARNING * _ROUNDING:
         return []
     lower = drive.velocity * STOKES_WARNING / drive.impact_stokes
     text = (

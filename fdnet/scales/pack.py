@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.case.spheres import Spheres
+from fdnet.case.spheres import Fines, Spheres
 from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import REFERENCE_OVERLAP, Contact, mass_range
 from fdnet.sizes import SURFACE, SizeCurve
@@ -99,6 +99,9 @@ def close_packing(curve: SizeCurve) -> float:
 
 SHARES = (0.1, 0.5, 0.9)
 """Shares by volume whose diameters are shown: D10, D50 and D90."""
+MOST_TAIL = 0.02
+"""Share of the solids left out at one end of a curve from which a warning names it: the end of a
+curve is cut at 1 % unless the case says otherwise."""
 MOST_MISFIT = 0.05
 """Difference of a law to a given diameter, over it, above which a warning names it: a quarter of
 the step between two sieves of the series R 40/3 (ISO 565), 19 %."""
@@ -139,22 +142,17 @@ def size_warnings(case: Case) -> Iterator[Doubt]:
         parts = [
             f"{100 * share:.3g} % of the solids ({side} than {1e6 * size:.3g} um)"
             for share, side, size in ends
-            if share > 1e-9
+            if share > MOST_TAIL
         ]
         if parts:
-            more = " and fines.cut_um" if name == "fines" else ""
-            yield Doubt(
-                "sizes-left-out",
-                f"{name}: {' and '.join(parts)} are left out; see sizes.cut_percent{more}",
-            )
-    if isinstance(case, InvasionCase) and case.fines.measured:
-        whole, placed = case.fines.volume_fraction, case.fines.placed_fraction
-        if placed < whole:
-            yield Doubt(
-                "thinner-suspension",
-                f"fines: the suspension carries {100 * placed:.3g} % of fines by volume instead "
-                f"of {100 * whole:.3g} %, because the sizes left out are not in it",
-            )
+            thinner = ""
+            if isinstance(spheres, Fines):
+                whole, placed = spheres.volume_fraction, spheres.placed_fraction
+                thinner = (
+                    f"; the mud carries {100 * placed:.3g} % of solids by volume instead of "
+                    f"{100 * whole:.3g} %"
+                )
+            yield Doubt("sizes-left-out", f"{name}: {' and '.join(parts)} are left out{thinner}")
     porosity = case.grains.porosity
     if case.grains.measured and case.grains.count is None and porosity is not None:
         rigid = 1 - close_packing(case.grains.curve)

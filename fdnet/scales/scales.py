@@ -9,7 +9,6 @@ from fdnet.errors import CaseError, Doubt
 from fdnet.scales.clock import (
     STARTING,
     chunk_refreshes,
-    densest_factor,
     deposit_pressure,
     drag_warnings,
     drive_in,
@@ -79,7 +78,7 @@ class InvasionScales(Scales):
         force_factor: drive velocity over the fluid's own; the factor on all forces on a fine, and
             physical time over simulated time.
         upstream_velocity: m/s, upstream of the formation face, as simulated.
-        supplied_count: number of fines in the slab.
+        supplied_count: number of fines in the slab; the most that come where the mud has no end.
         slab_length: m, along the flow.
         relaxation_time: s, of the drag on the smallest and on the largest fine.
         time_step: s, of the invasion.
@@ -206,7 +205,8 @@ def _invasion(
     fines, fluid, multiplier = case.fines, case.fluid, case.drag.multiplier
     small, large = fines.radius_range_m
     speed, viscosity = flow.interstitial, fluid.viscosity_Pa_s
-    slab, relaxation = slab_of(case), relaxation_times(case)
+    throat = 2 * large / throat_width(shared.porosity, flow.permeability)
+    slab, relaxation = slab_of(case, throat), relaxation_times(case)
     drive = drive_in(case, flow)
     push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
     upstream = drive.velocity
@@ -215,7 +215,7 @@ def _invasion(
     shortest = relaxation[0] * push.relaxation_share(small)
     step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
-    hold = hold_steps(case, step, shortest / densest_factor(case), times.chunk)
+    hold = hold_steps(case, step, shortest, times.chunk)
     chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
     borne = deposit_pressure(case, flow, shared.porosity)
@@ -227,7 +227,6 @@ def _invasion(
             f"(limit {MOST_STEPS:.3g}); raise the step or shorten run.checkpoint_ms"
         )
     reynolds = fluid.density_kg_m3 * speed * 2 * large / viscosity
-    throat = 2 * large / throat_width(shared.porosity, flow.permeability)
     displaced = fluid.density_kg_m3 * case.gravity.buoyancy
     excess = max(abs(one.density - displaced) for one in fines.components)
     weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
@@ -343,16 +342,22 @@ def back_flow(case: InvasionCase) -> BackFlow:
 
 
 def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
-    """The case with the drawdown for its overbalance, driven by the same factor as before.
+    """The case with the drawdown for its overbalance, driven at most by the same factor as before.
 
     What its table [run] says of the length of the invasion is that of the clean-up.
     """
     fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
-    undriven = case.drag.model_copy(update={"drive_velocity_m_s": None})
+    undriven = case.drag.model_copy(update={"drive_velocity_m_s": "fluid"})
     turned = case.model_copy(update={"fluid": fluid, "run": run, "drag": undriven})
     turned = stiff_enough(turned, start=False)
-    if case.drag.drive_velocity_m_s is None:
+    asked = case.drag.drive_velocity_m_s
+    if asked == "fluid":
         return turned
-    driven = scales_of(turned).interstitial_velocity * invasion_scales(case).force_factor
-    drag = case.drag.model_copy(update={"drive_velocity_m_s": driven})
+    own = scales_of(turned).interstitial_velocity
+    driven = own * invasion_scales(case).force_factor
+    if asked == "auto":
+        driven = min(
+            driven, invasion_scales(turned.model_copy(update={"drag": case.drag})).drive_velocity
+        )
+    drag = case.drag.model_copy(update={"drive_velocity_m_s": driven if driven > own else "fluid"})
     return turned.model_copy(update={"drag": drag})

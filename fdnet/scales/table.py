@@ -57,7 +57,7 @@ def row(key: str, value: float, **words: Any) -> Quantity:
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
     rows = [*_size_rows(case), *_flow_rows(case, scales)]
-    if isinstance(scales, InvasionScales):
+    if isinstance(scales, InvasionScales) and isinstance(case, InvasionCase):
         rows += _fine_rows(case, scales)
     cost = cost_of(case, scales)
     rows += [
@@ -119,7 +119,7 @@ def _flow_rows(case: Case, scales: Scales) -> Iterator[Quantity]:
     yield row("inertia", scales.inertial_loss)
 
 
-def _fine_rows(case: Case, scales: InvasionScales) -> Iterator[Quantity]:
+def _fine_rows(case: InvasionCase, scales: InvasionScales) -> Iterator[Quantity]:
     """How the simulation is driven, the forces on a fine, its overlaps, the supply, the times."""
     if scales.force_factor != 1.0:
         yield row("drive", scales.drive_velocity)
@@ -143,8 +143,9 @@ def _fine_rows(case: Case, scales: InvasionScales) -> Iterator[Quantity]:
     yield row(f"{case.contact.model}_drag", scales.drag_overlap)
     if case.drag.field == "network":
         yield row("deposit", scales.deposit_overlap, chain=LARGEST_CHAIN)
-    yield row("fines", scales.supplied_count)
-    yield row("slab", scales.slab_length)
+    most = ", at most" if case.fines.endless else ""
+    yield row("fines", scales.supplied_count, most=most)
+    yield row("slab", scales.slab_length, most=most)
     yield row("feeding", scales.slab_length / scales.upstream_velocity)
     yield row("plug_time", scales.plug_time)
     yield row("cap_time", scales.cap_time)

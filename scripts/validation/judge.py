@@ -238,10 +238,7 @@ def _half_of_wilson(share: float, trials: int) -> float:
     return float(band.high - band.low) / 2.0
 
 
-# ------------------------------------------------------------------------------------------------
-# What the table says: mean errors by value, in words.
-
-
+# ---- What the table says: mean errors by value, in words.
 def levels(rows: pd.DataFrame, series: str, quantity: str, *, cost: str = "core_s") -> list[Level]:
     """The values of one series, in the order of the table, as far as they have an error."""
     own = rows[(rows.series == series) & (rows.quantity == quantity) & rows.error.notna()]
@@ -310,10 +307,7 @@ def failures(rows: pd.DataFrame) -> list[str]:
     ]
 
 
-# ------------------------------------------------------------------------------------------------
-# The answer: what a shortcut costs.
-
-
+# ---- The answer: what a shortcut costs.
 class Shortcut(NamedTuple):
     """What a shortcut costs: its words, the error of a quantity, and how much time it saves."""
 

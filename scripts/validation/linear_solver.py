@@ -106,10 +106,7 @@ def _exact(pores: int, decades: float, seed: int, work: Path) -> Array:
     return exact_fluxes(circuit_of(pores, decades, seed, work))
 
 
-# ------------------------------------------------------------------------------------------------
-# Networks, and their exact answer.
-
-
+# ---- Networks, and their exact answer.
 def circuit_of(pores: int, decades: float, seed: int, work: Path) -> Circuit:
     """A circuit of about `pores` pores, periodic across the flow, by the law `lubrication`.
 
@@ -215,10 +212,7 @@ def _eliminated(
     return order
 
 
-# ------------------------------------------------------------------------------------------------
-# Methods.
-
-
+# ---- Methods.
 def solve_by(method: str, circuit: Circuit, tolerance: float) -> tuple[Array, float]:
     """Fluxes (K,) by one of `METHODS`, and the steps of an iteration (nan of a direct method).
 

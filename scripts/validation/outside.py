@@ -199,8 +199,14 @@ def held(trial: Trial) -> Seen:
         "grains": {"radius_mm": 0.25, "count": count, "friction": 0.1},
         "fines": {"radius_mm": 0.25 / trial.value, "count": fines, "friction": 0.1},
         "fluid": {"velocity_m_s": 1.0},
-        "drag": {"scheme": "viscous", "upstream": "interstitial", "pressure_gradient": False},
-        "run": {"duration_ms": 5 * length, "checkpoint_ms": 0.25 * length},
+        "contact": {"restitution": "dry"},
+        "drag": {
+            "field": "uniform",
+            "scheme": "viscous",
+            "upstream": "interstitial",
+            "pressure_gradient": False,
+        },
+        "run": {"stiffness_N_m": 1e4, "duration_ms": 5 * length, "checkpoint_ms": 0.25 * length},
     }
     case = with_fines(case_from(set_keys(tables, ["run.time_step_factor=0.2"])))
     grains, scales = packed(case, trial.folder.parent), invasion_scales(case)
@@ -463,14 +469,17 @@ def free(trial: Trial) -> Seen:
         "grains": {"radius_mm": 0.25, "porosity": 0.40},
         "fines": {"radius_mm": 1e3 * FINE, "count": 1, "density_kg_m3": DENSITY},
         "fluid": {"viscosity_cP": 50 * thin, "density_kg_m3": LIQUID, "velocity_m_s": SPEED},
+        "contact": {"restitution": "dry"},
         "drag": {
+            "field": "uniform",
+            "scheme": "held",
             "refresh_steps": 1,
             "upstream": "interstitial",
             "pressure_gradient": trial.value == GRADIENT,
             "inertia": "schiller-naumann" if trial.value == INERTIA else "none",
         },
         "gravity": {"mode": "on", "acceleration_m_s2": list(pull)} if pull else {"mode": "off"},
-        "run": {"duration_ms": 0.25 if trial.value == OBLIQUE else 1.0},
+        "run": {"stiffness_N_m": 1e4, "duration_ms": 0.25 if trial.value == OBLIQUE else 1.0},
     }
     case = with_fines(case_from(tables))
     scales, launch = invasion_scales(case), Launch(binary=the_binary())

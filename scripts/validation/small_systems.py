@@ -82,10 +82,7 @@ def slab_case(seed: int, *assignments: str) -> InvasionCase:
     return with_fines(read_case(path, assignments=[f"seed={seed}", *assignments]))
 
 
-# ------------------------------------------------------------------------------------------------
-# Closed systems: spheres with a case's contacts, without fluid, gravity or friction.
-
-
+# ---- Closed systems: spheres with a case's contacts, without fluid, gravity or friction.
 class Watch(NamedTuple):
     """How long to follow a closed system.
 
@@ -254,10 +251,7 @@ def deepest_overlap_of(damping_ratio: float, speed: float, stiffness: float, mas
     return speed / frequency * math.exp(-damping_ratio / s * math.atan2(s, damping_ratio))
 
 
-# ------------------------------------------------------------------------------------------------
-# A free fine that falls.
-
-
+# ---- A free fine that falls.
 def _fall(folder: Path, scheme: str, interval: float, looks: int) -> dict[str, float]:
     """Largest error of a falling fine; each of `looks` ends a run of its own, "steps" of drag."""
     keys = ["drag.refresh_steps=1" if scheme == "every step" else f"drag.scheme={scheme}"]

@@ -98,10 +98,7 @@ def kept_rows(name: str) -> pd.DataFrame:
     return judge.judged(judge.read_rows(KEPT / f"{name}.csv"), read_study(name).rules)
 
 
-# ------------------------------------------------------------------------------------------------
-# Points that are no runs.
-
-
+# ---- Points that are no runs.
 def points_of(study: Study) -> list[Point]:
     """Every combination of the settings of every table `[[points]]`."""
     return [point for table in study.data.get("points", ()) for point in _points(table)]
@@ -212,10 +209,7 @@ def processors() -> float:
     return sum(usage.ru_utime + usage.ru_stime for usage in usages)
 
 
-# ------------------------------------------------------------------------------------------------
-# Whole runs, carried by the campaign.
-
-
+# ---- Whole runs, carried by the campaign.
 def swept(study: Study, out: Path, *, jobs: int | None, show: bool) -> Iterator[dict[str, Any]]:
     """The rows of all runs of the sweep. Runs that `out` already has are not run again."""
     data = dict(study.data) | {"case": str(FOLDER / study.data["case"])}
@@ -258,10 +252,7 @@ def rows_of_run(
         yield row | {"quantity": quantity, "observed": number if done else None}
 
 
-# ------------------------------------------------------------------------------------------------
-# The command.
-
-
+# ---- The command.
 def run_study(
     study: Study, out: Path, *, jobs: int | None = None, show: bool = False
 ) -> pd.DataFrame:

@@ -146,7 +146,3 @@ def test_the_tables_are_read_with_their_types(tmp_path):
     values = made.table["layers_above_intact"]
     assert values.isna().tolist() == [False, True, False]
     assert made.table["seed"].tolist() == [1, 2, 3]
-    pq = pytest.importorskip("pyarrow.parquet")
-    table = pq.read_table(made.path / "table.parquet")
-    assert table["layers_above_intact"].to_pylist() == [3, None, 5]
-    assert table.column_names == list(made.table.columns)

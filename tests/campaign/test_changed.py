@@ -99,6 +99,26 @@ def test_a_changed_run_is_named_and_not_counted(ensemble, tmp_path, capsys):
             assert not Path(compared).exists()
 
 
+def test_a_changed_run_is_left_as_it_is_and_named(ensemble, tmp_path, capsys):
+    """No engine starts a job for it: `fdnet run` would refuse it, and Snakemake sees its files."""
+    out = tmp_path / "out"
+    shutil.copytree(ensemble, out)
+    summary = out / "runs" / BAD / "summary.json"
+    edited(k_reduction=0.999)(summary)
+    before = {path: path.stat().st_mtime_ns for path in out.glob("runs/*/*")}
+    fake = tmp_path / "lmp"
+    fake.write_text('#!/bin/bash\necho "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\n')
+    fake.chmod(0o755)
+    (tmp_path / "tiny.toml").write_text(tiny().toml())
+    more = ["--seeds", "3", "--liggghts", str(fake), "--out", str(out)]
+    assert main(["ensemble", str(tmp_path / "tiny.toml"), *more]) == 5
+    error = capsys.readouterr().err
+    assert f"{BAD} is left as it is: " in error
+    assert f"{BAD} failed: " in error
+    assert "write it anew with --stages analyse" in error
+    assert {path: path.stat().st_mtime_ns for path in out.glob("runs/*/*")} == before
+
+
 def test_a_run_without_a_result_is_left_out_with_a_word(ensemble, tmp_path, capsys):
     out = tmp_path / "out"
     shutil.copytree(ensemble, out)

@@ -197,6 +197,34 @@ def test_a_run_that_is_killed_says_so_and_stops_no_other(tmp_path, capsys):
     assert re.search(r"tiny-seed-2 failed: .*ERROR: played", error)
 
 
+def test_an_engine_and_jobs_that_cannot_be_are_refused(tmp_path):
+    for how, message in (
+        ({"engine": "cluster"}, "'cluster', expected one of local"),
+        ({"jobs": 0}, "jobs: 0 runs"),
+    ):
+        with pytest.raises(CaseError, match=message):
+            fdnet.ensemble(tiny(), out=tmp_path / "out", **how)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("engine", "_"), [("local", 0), SNAKEMAKE])
+def test_runs_whose_pack_failed_have_its_reason_and_the_others_go_on(tmp_path, capsys, engine, _):
+    """Two muds share the pack of each seed; that of seed 1 fails in another way."""
+    (tmp_path / "tiny.toml").write_text(tiny().toml())
+    sweep = tmp_path / "sweep.toml"
+    sweep.write_text('case = "tiny.toml"\nseeds = 2\n[grid]\nfines.count = [50, 60]\n')
+    text = f'[[ $PWD = *{tiny("seed=1").digest("pack")}* ]] && echo "ERROR: first" && exit 1'
+    fake = fake_liggghts(tmp_path / "lmp", f'{text}\necho "ERROR: second"; exit 1')
+    out = str(tmp_path / "out")
+    assert main(["sweep", str(sweep), "--out", out, "--engine", engine, "--liggghts", fake]) == 5
+    error = capsys.readouterr().err
+    for count in (50, 60):
+        for seed, reason in ((1, "first"), (2, "second")):
+            assert re.search(f"count={count}-seed-{seed} failed: .*ERROR: {reason}", error)
+    assert len(list((tmp_path / "out/packs").iterdir())) == 2
+    assert not (tmp_path / "out/runs").exists()
+
+
 def test_a_full_disk_starts_nothing_more(tmp_path, monkeypatch):
     answers = iter([False, True])
     monkeypatch.setattr(engine_module, "disk_is_full", lambda folder: next(answers, True))

@@ -75,8 +75,7 @@ def test_named_variants_meet_every_case(write, tmp_path):
 
 def test_bad_sweeps_are_refused_with_the_key(write):
     names = ("'$(touch hit)'", "'a; b'", "'a b'", "''", '"\'"', "5", "'-x'", '"a\\ntouch hit"')
-    case, judge = 'case = "tiny.toml"\n', "[grid]\nfines.count = [1, 2]\n[judge]\n"
-    good = "reference = { fines.count = 1 }\n"
+    case = 'case = "tiny.toml"\n'
     for text, message in (
         ("seeds = 2", "case: give one case file"),
         (f"{case}sweeps = 1", "sweeps: unknown key"),
@@ -98,29 +97,11 @@ def test_bad_sweeps_are_refused_with_the_key(write):
             "stands in \\[grid\\] and in set",
         ),
         ("case = ", "not valid TOML"),
-        (f"{case}{judge}{good}", "judge.quantities: .*required"),
-        (f"{case}{judge}{good}knee = 3", "judge.knee: unknown key"),
-        (f"{case}{judge}{good}quantities = ['k_reducton']", "did you mean k_reduction"),
-        (f"{case}{judge}{good}quantities = ['sections.1.k_damged_m2']", "did you mean k_damaged"),
-        (
-            f"{case}{judge}reference = {{ fines.count = 3 }}\nquantities = ['k_reduction']",
-            "judge.reference: .* is no variant; the varied keys: fines.count",
-        ),
+        (f"{case}[grid]\nfines.count = [5, 5]", "given twice"),
     ):
         with pytest.raises(CaseError, match=message):
             fdnet.sweep(write(text), out=write(text).parent / "out")
     assert not (write("").parent / "out").exists()
-
-
-def test_a_judge_is_kept_with_the_plan(write):
-    """Its table stands in plan.json and decides nothing about what is run."""
-    judge = {"reference": {"fines.count": 40}, "quantities": ["k_reduction", "skin"]}
-    text = 'case = "tiny.toml"\n[grid]\nfines.count = [40, 80]\n'
-    plain, _ = planned(write(text))
-    plan, _ = planned(write(f"{text}{tomli_w.dumps({'judge': judge})}"))
-    assert plain["judge"] == {}
-    assert plan["judge"] == judge
-    assert plan["digest"] == plain["digest"]
 
 
 def test_a_million_runs_are_refused_with_their_number(write, capsys):

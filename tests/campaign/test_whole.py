@@ -75,12 +75,19 @@ def test_the_difference_is_taken_seed_by_seed(swept):
 
 
 def test_packs_are_made_once(swept):
-    """Two packs for four runs; the copies have the same files and count no time of LIGGGHTS."""
+    """Two packs for four runs; the copies count no time of LIGGGHTS, the whole counts it once."""
     out, _ = swept
     records = [json.loads(p.read_text()) for p in sorted(out.glob("runs/*/pack/stage.json"))]
     assert len(records) == 4
     assert len({record["taken_from"] for record in records}) == 2
     assert all(run["seconds"] == 0 for record in records for run in record["runs"])
+    cost = json.loads((out / "summary.json").read_text())["all_cpu_seconds"]
+    runs = [json.loads(p.read_text())["cpu_seconds"] for p in out.glob("runs/*/summary.json")]
+    packs = [json.loads(p.read_text()) for p in out.glob("packs/*/pack/stage.json")]
+    shared = sum(run["cpu_seconds"] for one in packs for run in (one, *one["runs"]))
+    shared += sum(row["liggghts_cpu_s"] for one in packs for row in one["attempts"][:-1])
+    assert cost == pytest.approx(shared + sum(sum(one.values()) for one in runs))
+    assert shared > 0
     made = {p.read_bytes() for p in out.glob("packs/*/pack/post/pack.dump")}
     assert made == {p.read_bytes() for p in out.glob("runs/*/pack/post/pack.dump")}
 

@@ -70,7 +70,6 @@ overbalance = "300 psi"
 duration = "2 ms"
 """
 
-
 PLAIN = {
     "name": "tiny",
     "box": {"size_mm": [3.0, 1.6, 1.6]},

@@ -30,7 +30,6 @@ from fdnet.scales.scales import back_flow, scales_of
 
 pytestmark = pytest.mark.liggghts
 
-
 STAGES = ("pack", "invade", "clean_up", "analyse")
 
 

@@ -190,10 +190,7 @@ def test_a_fine_parts_from_a_plane_above_the_pull_off_force(tmp_path):
         assert bool(frames[-1].column("z")[1] > FINE) is parts, pull
 
 
-# ------------------------------------------------------------------------------------------------
-# Energy and momentum of closed systems.
-
-
+# ---- Energy and momentum of closed systems.
 def gas(count_a_side: int, edge: float, speed: float) -> Snapshot:
     """Fines on a grid of a periodic box, no net momentum, the first of type 1."""
     place = (np.indices((count_a_side,) * 3).reshape(3, -1).T + 0.5) * edge / count_a_side
@@ -254,10 +251,7 @@ def test_a_damped_pack_comes_to_rest_up_to_the_largest_step_and_not_far_above(
     assert left[1] > 1e-4
 
 
-# ------------------------------------------------------------------------------------------------
-# Fines that lock between two grains.
-
-
+# ---- Fines that lock between two grains.
 def leaving_time(stiffness: float, ratio: float, step: float, folder) -> tuple[float, float]:
     """When a fine that falls around the neck of two grains leaves it, s, and the false force.
 

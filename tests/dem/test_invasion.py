@@ -24,6 +24,7 @@ from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.supply import batches_of, place_batches
 from fdnet.errors import LiggghtsError
+from fdnet.scales import clock
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.snapshot import Kind
 
@@ -80,15 +81,23 @@ def test_a_batched_invasion_accounts_for_every_fine(go, tmp_path, scheme, forces
     assert whole.max_overlap < (0.15 if forces else 0.1)
 
 
-def test_every_stop_reason_is_told_and_fines_that_pass_are_removed(go, tmp_path):
+def test_every_stop_reason_is_told_and_fines_that_pass_are_removed(go, tmp_path, monkeypatch):
+    """Five fines that wait at the face do not say that it is plugged."""
     passing = ("fines.radius_mm=0.02", "fines.friction=0.0", "fines.count=200", "run.cap_ms=3.0")
-    for reason, keys in {
-        "cap": ("run.cap_ms=0.05",),
-        "plugged": ("fines={radius_mm=0.12, count=60}",),
-        "supply_exhausted": passing,
-    }.items():
-        result = go(tiny(*keys), tmp_path / reason)
+    monkeypatch.setattr(clock, "MUD_PORES", 0.06)
+    for number, (reason, *keys) in enumerate(
+        [
+            ("cap", "run.cap_ms=0.05"),
+            ("plugged", "fines={radius_mm=0.12, count=60}"),
+            ("supply_exhausted", "fines={radius_mm=0.12, count=5}"),
+            ("mud_cut_off", "fines={radius_mm=0.02, friction=0.0}", "run.cap_ms=3.0"),
+            ("supply_exhausted", *passing),
+        ]
+    ):
+        result = go(tiny(*keys), tmp_path / str(number))
         assert result.stop_reason == reason
+        said = any("the mud was cut off after" in warning for warning in result.warnings)
+        assert said == (reason == "mud_cut_off")
     assert result.history[-1].passed > 0
     assert len(result.damaged.fines()) == 200 - result.history[-1].passed
     assert any("empty slab" in warning for warning in result.warnings)

@@ -108,10 +108,7 @@ def test_a_fine_at_rest_is_pressed_by_the_drag_of_the_fluid(tmp_path, scheme, ra
     assert along(frames, "x")[-1] - TOUCHES == pytest.approx(force / stiffness, rel=1e-4)
 
 
-# ------------------------------------------------------------------------------------------------
-# The pressure gradient, finite Reynolds numbers, and a dense bed.
-
-
+# ---- The pressure gradient, finite Reynolds numbers, and a dense bed.
 def pushed(*assignments: str) -> Case:
     """The gradient is as strong as the drag of the fluid in these fines."""
     return tiny(
@@ -178,10 +175,7 @@ def test_drag_at_a_finite_reynolds_number_relaxes_as_schiller_and_naumann_have_i
         assert along(frames)[-1] > 2 * 8.0 * (1 - math.exp(-at[-1] / tau)), "Stokes's is slower"
 
 
-# ------------------------------------------------------------------------------------------------
-# Gravity, in whole invasions.
-
-
+# ---- Gravity, in whole invasions.
 def fallen(case: Case, binary, folder: Path) -> tuple[Snapshot, float]:
     """Spheres after the fall of all fines far from the only grain, and the time, s."""
     scales = scales_of(case)

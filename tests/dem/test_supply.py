@@ -155,10 +155,7 @@ def test_a_batch_enters_before_it_could_meet_the_cake(concentration):
     assert max(entered) <= batches.reach + 1e-15
 
 
-# ------------------------------------------------------------------------------------------------
-# Batches that come as the mud carries them, clear of fines that lag behind.
-
-
+# ---- Batches that come as the mud carries them, clear of fines that lag behind.
 def followed_batches(*more):
     keys = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02")
     case = followed(*keys, *more)

@@ -35,10 +35,7 @@ def values_of(case):
     return {row.name: row.value for row in scale_rows(case, scales_of(case))}
 
 
-# ------------------------------------------------------------------------------------------------
-# One fine: drag, pressure gradient and Reynolds number.
-
-
+# ---- One fine: drag, pressure gradient and Reynolds number.
 def test_the_gradient_over_the_drag_of_the_thesis_specimens(root):
     """(2/9) r^2 phi / k, worked out in the review of the invasion half."""
     for specimen, ratio in enumerate((5.6, 2.2, 0.54, 2.3, 0.90, 0.225), start=1):
@@ -87,10 +84,7 @@ def test_schiller_and_naumann_by_hand_and_within_their_range():
         assert slip <= 3.0
 
 
-# ------------------------------------------------------------------------------------------------
-# A crowd, and the pressure drop of a bed.
-
-
+# ---- A crowd, and the pressure drop of a bed.
 def test_the_bed_of_cfdem_by_ergun():
     """CFDEMcoupling's ErgunTestMPI, as its totalPressureDrop.m has it."""
     diameter, porosity, density = 1e-3, 0.451335, 10.0
@@ -153,9 +147,7 @@ def test_the_law_of_beds_at_numbers_worked_out_by_hand_and_outside_of_its_range(
             bed_factor(np.array([0.5, porosity]), np.array([1.0, reynolds]))
 
 
-# ------------------------------------------------------------------------------------------------
-# A sphere on the axis of a tube, against Stokes's equations solved by boundary collocation.
-
+# ---- A sphere on the axis of a tube, against Stokes's equations solved by boundary collocation.
 END, PERIOD, WAVES, POLES = 5.0, 7.0, 90, 20
 """Half length of the closed tube and half period of its waves, radii of the tube; terms."""
 

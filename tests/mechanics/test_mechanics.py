@@ -54,10 +54,7 @@ def random_pack(count=150):
     return resting(place * R, np.full(count, R), np.array([[0, side * R]] * 3))
 
 
-# ------------------------------------------------------------------------------------------------
-# One bond, by the theory of beams.
-
-
+# ---- One bond, by the theory of beams.
 @pytest.mark.parametrize("solver", [direct_solver, iterative_solver])
 def test_a_bond_under_tension_shear_bending_and_torsion(solver):
     """The first grain is held, loads act on the second, with the lever R2 about the bond."""
@@ -102,10 +99,7 @@ def test_a_bond_under_tension_shear_bending_and_torsion(solver):
     assert tension == pytest.approx(0.0, abs=1e-6 * shear)
 
 
-# ------------------------------------------------------------------------------------------------
-# Elastic tensors.
-
-
+# ---- Elastic tensors.
 def test_lattices_in_closed_form():
     """Simple cubic: C11 = kn / a, C12 = 0, C44 = ks / 2a, a = 2 R, and bonds add their discs.
 
@@ -162,10 +156,7 @@ def test_rattlers_are_counted_and_a_layer_that_touches_nothing_is_refused_by_its
         elastic_of(resting(place[place[:, 2] < R], R, box), SPRINGS, periodic=ALL)
 
 
-# ------------------------------------------------------------------------------------------------
-# Triaxial tests.
-
-
+# ---- Triaxial tests.
 def column():
     """Four grains along x in a periodic box: a ring of contacts, free sideways."""
     place = np.column_stack([(2 * np.arange(4) + 1) * R, np.full(4, 2 * R), np.full(4, 2 * R)])

@@ -56,10 +56,7 @@ def test_thin_slabs_against_resolved_stokes_flow():
 # Side walls that hold the fluid.
 
 
-# ------------------------------------------------------------------------------------------------
-# Throats that fines bound, in the network of all spheres.
-
-
+# ---- Throats that fines bound, in the network of all spheres.
 @pytest.fixture(scope="module")
 def pack():
     return with_fines(random_pack(40, aspect=2.0), 60, 0.2)

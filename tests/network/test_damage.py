@@ -17,9 +17,7 @@ from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.networks import chain
 from tests.network.packs import random_pack, with_fines
 
-# ------------------------------------------------------------------------------------------------
-# The laws of the thesis, on single throats.
-
+# ---- The laws of the thesis, on single throats.
 R, L = 0.1, 1.0
 CLEAN = np.pi * R**4 / (8 * L)
 
@@ -75,10 +73,7 @@ def test_thresholds_of_text_and_code_and_by_choice():
         assert used == ["clogging"] * clogged + ["deposition"] * (4 - clogged)
 
 
-# ------------------------------------------------------------------------------------------------
-# The law by sections.
-
-
+# ---- The law by sections.
 @pytest.fixture(scope="module")
 def dense():
     return with_fines(random_pack(40), 150, 0.2)
@@ -136,10 +131,7 @@ def test_fines_that_come_leave_and_move_renew_the_throats_they_reach(dense, peri
     assert (full.without.sum(axis=1) / raised)[clean > 0] == pytest.approx(lost, abs=0.01)
 
 
-# ------------------------------------------------------------------------------------------------
-# The network of grains and fines together.
-
-
+# ---- The network of grains and fines together.
 @pytest.fixture(scope="module")
 def pack():
     return with_fines(random_pack(40, aspect=2.0), 60, 0.2)

@@ -267,15 +267,18 @@ def cake_thickness(fines, *, periodic=NONE):
     return invaded.cake_thickness
 
 
-def test_the_cake_is_what_hangs_together_from_the_grains_on():
-    row = [[-0.1, 2, 2], [-0.3, 2, 2], [-0.5, 2, 2]]
-    assert cake_thickness([*row, [-0.75, 2, 2]]) == pytest.approx(0.6), "the fourth lies apart"
-    assert cake_thickness([[-0.5, 2, 2], [-0.7, 2, 2]]) == cake_thickness([]) == 0.0
+def test_the_cake_is_what_stands_on_the_pack():
+    pair = [[-0.1, 2, 2], [-0.0818, 2.1992, 2]]  # on the grain, touching each other
+    on_both = [-0.2634, 2.1153, 2.0]
+    assert cake_thickness([*pair, on_both]) == pytest.approx(0.3634)
+    falling = [[-0.4634, 2.1153, 2], [-0.6634, 2.1153, 2]]
+    assert cake_thickness([*pair, on_both, *falling]) == pytest.approx(0.3634), "by one contact"
+    assert cake_thickness([[-0.1, 2, 2], [-0.3, 2, 2]]) == cake_thickness([]) == 0.0
     sides = (False, True, True)
-    across = [[0.05, 0.05, 2], [-0.10, 3.92, 2]]  # 0.13 apart across the side y
+    across = [[0.05, 0.05, 2], [0.05, 3.8, 2], [-0.10, 3.92, 2]]  # 0.13 apart across the side y
     assert cake_thickness(across, periodic=sides) == pytest.approx(0.2)
     assert cake_thickness(across) == 0.0
-    rounded = [[0.05, -1e-20, 2], [-0.10, 0.13, 2]]  # modulo the period it is the period itself
+    rounded = [[0.05, -1e-20, 2], [0.05, 0.26, 2], [-0.10, 0.13, 2]]
     assert cake_thickness(rounded, periodic=sides) == pytest.approx(0.2)
 
 

@@ -59,10 +59,7 @@ def test_cut_off_pores_are_counted_and_no_open_path_is_zero_with_its_reason():
     assert in_place.tolist() == [0.0, 0.0]
 
 
-# ------------------------------------------------------------------------------------------------
-# Periods.
-
-
+# ---- Periods.
 @pytest.fixture(scope="module")
 def periods():
     """A periodic network, and the one of three copies in a row between planes; its edge."""
@@ -90,10 +87,7 @@ def test_a_period_is_the_middle_copy_of_three(periods):
         assert solve_flow(one, law(one)).inflow == pytest.approx(middle, rel=0.03), name
 
 
-# ------------------------------------------------------------------------------------------------
-# Direct and multigrid.
-
-
+# ---- Direct and multigrid.
 def links(count=400):
     """A ring with chords, conductances over four decades; one node in ten tied to pressure 0."""
     rng = np.random.default_rng(2)
@@ -146,8 +140,11 @@ def test_multigrid_solves_pores_without_neighbours():
 def test_direct_takes_over_where_multigrid_fails_and_what_neither_can_solve_is_refused(
     monkeypatch,
 ):
-    with pytest.raises(FlowError, match="no way out"):
-        Balances(np.zeros((0, 2), int), np.zeros(0), np.zeros(3)).solve(np.ones(3))
+    chain = np.array([[0, 1], [1, 2]])
+    for pair, most in ((chain[:0], 3), (chain[:0], 0), (chain, 0)):
+        closed = Balances(pair, np.ones(len(pair)), np.zeros(3), direct_up_to=most)
+        with pytest.raises(FlowError, match=r"3 pores failed: .*no way out"):
+            closed.solve(np.ones(3))
     pair, g, tied, source = links()
     expected = Balances(pair, g, tied).solve(source)
     monkeypatch.setattr(solver, "DIRECT_UP_TO", 0)
@@ -160,9 +157,7 @@ def test_direct_takes_over_where_multigrid_fails_and_what_neither_can_solve_is_r
         Balances(pair, g, tied).solve(source)
 
 
-# ------------------------------------------------------------------------------------------------
-# Balances over many decades.
-
+# ---- Balances over many decades.
 NODES = 16
 
 

@@ -145,10 +145,7 @@ def test_bad_points_packs_and_cells_are_refused():
         fdnet.velocity_field(far, periodic="yz")
 
 
-# ------------------------------------------------------------------------------------------------
-# Streamlines.
-
-
+# ---- Streamlines.
 class Velocity:
     """Stands for a field: the velocity of a formula of x, y, z."""
 

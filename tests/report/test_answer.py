@@ -223,7 +223,6 @@ SUMMARY = {
     "scatter": {"depth_p95_relative": 0.36, "first_mm_loss": 0.067, "runs": 30, "source": "x.csv"},
 }
 
-
 WELL = {"skin": 0.056, "skin_flow_lost": 0.0081, "skin_well_radius_m": 0.108}
 
 
@@ -242,10 +241,7 @@ def test_the_answer_is_a_sentence_to_act_on():
             assert not_said not in text
 
 
-# ------------------------------------------------------------------------------------------------
-# Filtrate: a growing cake at constant pressure in closed form, and when nothing may be said.
-
-
+# ---- Filtrate: a growing cake at constant pressure in closed form, and when nothing may be said.
 PRESSURE, VISCOSITY, PACK = 3.5e6, 0.05, 4e7
 """Pa, Pa s, and the resistance of the pack in 1/m."""
 

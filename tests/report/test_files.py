@@ -223,10 +223,7 @@ def test_fluxes_in_paraview_follow_from_pressures_and_conductances(finished, tmp
             assert np.allclose(flux[known], expected[known], rtol=0, atol=near), (periodic, state)
 
 
-# ------------------------------------------------------------------------------------------------
-# Sphere tables: nothing is lost by writing.
-
-
+# ---- Sphere tables: nothing is lost by writing.
 def columns(path, **units):
     """Position, radius and kind; without a column kind all are grains."""
     rows = read_csv(path, **units)
@@ -254,9 +251,7 @@ def test_comments_blank_lines_bom_crlf_quotes_and_column_order_are_fine(tmp_path
 
 HEADER = "x,y,z,radius,kind\n"
 
-
 GOOD = "1,2,3,1,grain\n"
-
 
 BROKEN = {
     "nan": (HEADER + GOOD + "1,nan,3,1,grain\n", ":3: y is 'nan', expected a finite number"),

@@ -19,7 +19,6 @@ from fdnet.run.movie import LINES, flux_of, movie_of, streamlines_of
 
 BOX = np.array([[0.0, 4e-3], [0.0, 2e-3], [0.0, 2e-3]])
 
-
 GREYS = (40, 120, 200)
 
 
@@ -138,10 +137,7 @@ def test_a_movie_of_a_changed_run_is_refused(copied, tmp_path, shown):
         path.write_bytes(whole)
 
 
-# ------------------------------------------------------------------------------------------------
-# The flow at the states of a run.
-
-
+# ---- The flow at the states of a run.
 @pytest.mark.liggghts
 def test_fluxes_are_those_of_the_run_before_and_after(finished):
     """throats.csv holds the fluxes of both states over the same drop of pressure."""

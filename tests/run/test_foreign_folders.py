@@ -19,7 +19,6 @@ CUBE = "x_m,y_m,z_m,radius_m\n" + "".join(
     f"{x + 0.5},{y + 0.5},{z + 0.5},0.5\n" for x in range(3) for y in range(3) for z in range(3)
 )
 
-
 LAWS = "law,damage_law,k_initial_m2\nlubrication,section-archie,1e-12\n"
 
 

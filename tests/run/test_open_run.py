@@ -160,10 +160,7 @@ def test_a_finished_run_is_read_and_one_of_another_case_refused(run):
     assert sorted(path.stat().st_mtime_ns for path in run.path.rglob("*")) == before
 
 
-# ------------------------------------------------------------------------------------------------
-# What is no finished run, and files that are not as the run wrote them.
-
-
+# ---- What is no finished run, and files that are not as the run wrote them.
 def test_what_is_no_finished_run_is_refused(copied, tmp_path):
     (tmp_path / "a file").write_text("")
     (tmp_path / "empty").mkdir()

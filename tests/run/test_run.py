@@ -20,9 +20,7 @@ from fdnet.cli import main
 
 pytestmark = pytest.mark.liggghts
 
-
 MORE_HOURS = "run.max_hours=99"
-
 
 TOO_DENSE = "grains.count=110"
 """Refused only after packing, when the folder holds something already."""

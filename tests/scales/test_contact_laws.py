@@ -22,7 +22,6 @@ from fdnet.scales.table import scale_rows
 
 HERTZ = "contact.model=hertz"
 
-
 WET = "contact.restitution=liquid"
 
 
@@ -107,10 +106,7 @@ def test_contacts_belong_to_the_digests_of_what_they_decide():
         assert tiny(key).digest("invade") != tiny().digest("invade")
 
 
-# ------------------------------------------------------------------------------------------------
-# Rebound in the liquid, and cohesion.
-
-
+# ---- Rebound in the liquid, and cohesion.
 def test_contacts_of_a_fine_take_the_stokes_number_of_the_fluid():
     """Fixed grains count as infinitely heavy; contacts of grains stay dry."""
     case = tiny(WET, "fluid.velocity_m_s=3.0", "fluid.viscosity_cP=2.0")
@@ -166,10 +162,7 @@ def test_cohesion_that_draws_fines_into_grains_warns_and_is_refused():
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# Fines that lock between two grains.
-
-
+# ---- Fines that lock between two grains.
 SMALL = "fines.radius_mm=0.0125"
 
 

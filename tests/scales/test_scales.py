@@ -13,6 +13,7 @@ from fdnet.case.file import case_from, read_case, set_keys
 from fdnet.dem.checkpoint import chunks_of, steps_after
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
+from fdnet.dem.supply import batches_of
 from fdnet.errors import CaseError
 from fdnet.scales.clock import STARTING, deposit_pressure, slab_of
 from fdnet.scales.contacts import series
@@ -56,7 +57,7 @@ def test_springs_in_series_and_smaller_friction(specimen1):
     assert ratio == pytest.approx(31.5 / 47.15, rel=1e-9)
 
 
-FOLLOWED = ("drag.field=network", "drag.upstream=darcy", "fines.supply=slab", "fines.count=100")
+FOLLOWED = ('drag={field = "network"}', "fines.supply=slab", "fines.count=100")
 
 
 def test_stiffness_auto_is_the_least_that_keeps_overlaps_small():
@@ -64,7 +65,6 @@ def test_stiffness_auto_is_the_least_that_keeps_overlaps_small():
         with naming(model):
             keys = (
                 *FOLLOWED,
-                "drag.scheme=implicit",
                 f"contact.model={model}",
                 "fluid.velocity_m_s=5",
             )
@@ -205,6 +205,24 @@ def test_the_plug_time_waits_for_fines_to_arrive():
     assert scales_of(tiny()).plug_time == pytest.approx(
         4 * 0.5e-3 / scales_of(tiny()).interstitial_velocity
     )
+
+
+def test_mud_without_an_end_is_bounded_by_what_plugs_by_pores_and_by_number():
+    """n v / (A D50) = 2.5, or 5 phi L where fines pass, or 200,000 fines; and the box is long."""
+    area, ball = 1.6e-3**2, 4 / 3 * math.pi
+    held = scales_of(tiny("fines={radius_mm=0.08}"))
+    solids = held.supplied_count * ball * 0.08e-3**3 / area
+    assert solids == pytest.approx(2.5 * 0.5e-3, rel=1e-3)
+    assert held.slab_length == pytest.approx(2.5 * 0.5e-3 / 0.1)
+    passing = scales_of(tiny("fines={radius_mm=0.02}"))
+    assert passing.slab_length == pytest.approx(5 * passing.porosity * 3e-3)
+    many = scales_of(tiny("fines={radius_mm=0.002}"))
+    assert many.supplied_count == 200_000
+    assert many.slab_length == pytest.approx(2e5 * ball * 2e-6**3 / (0.1 * area))
+    dilute = tiny("fines={radius_mm=0.08, concentration=1e-4}")
+    assert scales_of(dilute).slab_length == pytest.approx(1000 * 3e-3)
+    assert batches_of(dilute, scales_of(dilute)).counts[:-1] == (10,) * 35
+    assert tiny("well={radius_mm=108.0}", "fines={radius_mm=0.08}").well.drainage_radius_m == 100
 
 
 def test_a_duration_is_met_by_whole_chunks():
@@ -408,11 +426,11 @@ def test_a_drive_that_inertia_forbids_is_refused():
     assert f"expected at most {most:.2g} m/s" in str(caught.value)
     with pytest.raises(CaseError, match="in the fluid itself"):
         scales_of(tiny(f"fluid.velocity_m_s={2 * most}", "drag.drive_velocity_m_s=0.1"))
-    with pytest.raises(CaseError, match="in the fluid itself"):
-        scales_of(tiny(f"fluid.velocity_m_s={2 * most}", "drag.drive_velocity_m_s=auto"))
     keys = ("contact.model=hertz", "contact.cohesion_J_m3=1e4")
-    with pytest.raises(CaseError, match=r"drag\.drive_velocity_m_s: auto with .*cohesion is not"):
-        tiny("drag.drive_velocity_m_s=auto", *keys)
+    with pytest.raises(CaseError, match=r"drag\.drive_velocity_m_s: 0.1 with .*cohesion is not"):
+        tiny("drag.drive_velocity_m_s=0.1", *keys)
+    for kept in ([f"fluid.velocity_m_s={2 * most}"], [*keys, WELL]):
+        assert scales_of(tiny("drag.drive_velocity_m_s=auto", *kept)).force_factor == 1.0
 
 
 @pytest.mark.liggghts

@@ -14,9 +14,7 @@ from fdnet.scales.scales import InvasionScales, scales_of
 
 FINE = 4 / 3 * math.pi * (0.05e-3) ** 3 * 2146
 
-
 FAST = "drag.multiplier=1e3"
-
 
 SLOW = "fluid.velocity_m_s=0.005"
 """So slow a fluid that drag a thousand times Stokes's does not press fines shut."""
@@ -130,10 +128,7 @@ def test_a_refresh_beyond_the_chunk_is_refused():
         )
 
 
-# ------------------------------------------------------------------------------------------------
-# The expected cost, and the refusal of a run longer than `run.max_hours`.
-
-
+# ---- The expected cost, and the refusal of a run longer than `run.max_hours`.
 def hours(case: Case) -> float:
     cost = cost_of(case, scales_of(case))
     return (cost.pack_seconds + cost.invade_seconds) / 3600

@@ -148,10 +148,7 @@ def test_three_points_of_a_law_are_met_and_others_by_the_line_of_least_squares()
     assert other.worst > fit.worst
 
 
-# ------------------------------------------------------------------------------------------------
-# Random close packing of a range of sizes, and porosities that it rules out.
-
-
+# ---- Random close packing of a range of sizes, and porosities that it rules out.
 def test_spheres_fill_what_farr_and_groot_calibrated_on_and_farrs_formula_says():
     """R. S. Farr, Powder Technol. 245 (2013) 28, by number, within 0.0003 as he states."""
     one = SizeCurve(law=Uniform(1.0, 1.0), by=NUMBER, low=1.0, high=1.0)

@@ -107,7 +107,7 @@ def test_a_bad_curve_gets_one_clear_problem():
 def test_materials_have_their_shares_of_mass_and_their_densities(tmp_path):
     """Also in the data files of the batches, read back by id."""
     data = measured(fines=None, materials=MIXTURE, supply="batches", slab="3 mm")
-    case = case_from(data | {"run": {"checkpoint_ms": 0.005}})
+    case = case_from(data | {"run": {"checkpoint_ms": 0.005}, "drag": {"field": "uniform"}})
     scales, fines = scales_of(case), case.fines
     counts = batches_of(case, scales).counts
     density, drawn = densities(case, counts), drawn_fines(case, counts)

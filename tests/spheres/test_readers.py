@@ -137,9 +137,7 @@ def test_choices_that_do_not_fit_the_file_are_refused(pack, tmp_path):
             read_spheres(path, **change)
 
 
-# ------------------------------------------------------------------------------------------------
-# Dumps.
-
+# ---- Dumps.
 PLAIN_DUMP = lattice_dump()
 TILTS = "xy xz yz pp pp pp"
 
@@ -231,9 +229,7 @@ def test_the_sides_are_those_of_the_file(tmp_path):
     assert any("so that x, z has walls" in text for text in said)
 
 
-# ------------------------------------------------------------------------------------------------
-# Dumps in binary.
-
+# ---- Dumps in binary.
 COLUMNS = ("id", "x", "radius")
 ROWS = np.array([[3.0, 0.1, 1e-5], [1.0, 0.2, 2e-5], [2.0, -0.3, 3e-5]])
 BOUNDS = (0.0, 1.0, 0.0, 2.0, -1.0, 3.0)
@@ -287,10 +283,7 @@ def test_what_is_no_whole_binary_frame_is_refused(read, tmp_path):
         read_binary_frame(tmp_path / "none.bin", COLUMNS)
 
 
-# ------------------------------------------------------------------------------------------------
-# Tables and VTK files of other codes.
-
-
+# ---- Tables and VTK files of other codes.
 def rows_of(sep: str = ",", size: str = "0.5", end: str = "\n") -> str:
     return "".join(sep.join([*map(str, place), size]) + end for place in PLACES.tolist())
 

@@ -15,9 +15,7 @@ from tests.network.packs import face_centred, random_pack, simple_cubic, snapsho
 
 ALL, SIDES, NONE = (True,) * 3, (False, True, True), (False,) * 3
 
-
 SC_SPACING = 2.0
-
 
 EDGE = 3 * SC_SPACING
 

@@ -19,7 +19,6 @@ NIGHTLY = pytest.mark.nightly
 ROUNDING = 1e-11
 """Largest relative difference of two descriptions, without fines and with them."""
 
-
 RAYS = {"xyz": 1e-4, "yz": 1e-4, "": 5e-4}
 """By the default damage law, which sums sections over rays and splits prisms at a face either way:
 at side walls there are more of these."""

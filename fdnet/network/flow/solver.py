@@ -77,11 +77,16 @@ class Balances:
         """
         if not len(source):
             return np.zeros(0)
-        if self._solve is None:
-            self._solve = (direct if self._direct else multigrid)(self._matrix)
         source = source / self._unit
         within = CG_TOLERANCE * _total(source) if imbalance is None else imbalance / self._unit
-        pressure = self._solve(source, within)
+        try:
+            if self._solve is None:
+                self._solve = (direct if self._direct else multigrid)(self._matrix)
+            pressure = self._solve(source, within)
+        except (RuntimeError, ZeroDivisionError) as error:  # of multigrid, which has no check
+            raise FlowError(
+                f"solve of {len(source)} pores failed: {error}; a group of pores has no way out"
+            ) from error
         if not self._direct and not np.all(np.isfinite(pressure)):
             _check_memory(len(source))
             self._direct, self._solve = True, direct(self._matrix)

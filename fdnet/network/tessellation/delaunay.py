@@ -7,7 +7,6 @@ from scipy.spatial import ConvexHull, Delaunay, QhullError
 
 from fdnet.errors import NetworkError
 from fdnet.network.compiled import compiled
-from fdnet.network.tessellation.triangulation import triangulate
 from fdnet.spheres.geometry import (
     INSIDE,
     inside_others,
@@ -494,9 +493,6 @@ SAME_CENTRE = 1e-5
 """Power centres nearer than this, in mean grain radii, are one point."""
 EQUAL_SPREAD = 1e-3
 """Radii that spread by at most this share of their mean are treated as equal."""
-COMPILED_FROM = 2000
-"""Points from which on the compiled tessellation is used; below it Qhull takes less than 0.05 s,
-and the compiler is not needed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -566,14 +562,11 @@ def make_tetrahedra(
 def _tessellated(
     points: ImagePoints, grains: int, scale: float, *, unequal: bool
 ) -> tuple[Array, Array]:
-    """Tetrahedra and neighbours (-1: none), by the compiled tessellation or by Qhull."""
-    radius = points.radius / scale if unequal else np.zeros(len(points.radius))
-    if len(radius) >= COMPILED_FROM:
-        made = triangulate(points.scaled, radius**2)
-        if made is not None:
-            return made
+    """Tetrahedra and neighbours (-1: none), by Qhull."""
     try:
-        return _power_hull(points.scaled, radius) if unequal else _delaunay(points.scaled)
+        if unequal:
+            return _power_hull(points.scaled, points.radius / scale)
+        return _delaunay(points.scaled)
     except QhullError as error:
         raise NetworkError(
             f"tessellation of {grains} grains failed, they lie in one plane or line: "

@@ -79,10 +79,7 @@ def values_of(results: Table, run: str, quantity: str, laws: str = LAWS[0]) -> A
     return values_in(rows_of(results, run, laws), quantity).dropna().to_numpy()
 
 
-# ------------------------------------------------------------------------------------------------
-# Means, differences and their 95 % bands.
-
-
+# ---- Means, differences and their 95 % bands.
 class Mean(NamedTuple):
     """A mean over seeds, its variance and degrees of freedom, seeds, and whose spread it has."""
 
@@ -120,9 +117,7 @@ def half_width(*means: Mean) -> float:
     return float(student.ppf(0.975, 1 / sum(parts)) * math.sqrt(variance))
 
 
-# ------------------------------------------------------------------------------------------------
-# Tables 3 to 11: tables.csv.
-
+# ---- Tables 3 to 11: tables.csv.
 ONE, FIVE = ("specimen1", "specimen1-7to8", "specimen1-1410"), ("specimen5", "specimen5-5to6")
 TABLES: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     "Table 3": ((TABLE3,), [*QUANTITIES][:6]),
@@ -174,9 +169,7 @@ def _cells(rows: Table, run: str, names: Sequence[str]) -> Iterator[tuple[Any, .
             yield column, given[number - 1], 100 * rows[column], "%", True
 
 
-# ------------------------------------------------------------------------------------------------
-# The seven trends of the thesis's chapter 4 and Figure 14: trends.csv.
-
+# ---- The seven trends of the thesis's chapter 4 and Figure 14: trends.csv.
 RESPONSES: Mapping[str, tuple[str, str]] = {
     "mean depth per decade of drag": ("mean depth", "mm"),
     "depth of 95 % per decade of drag": ("depth of 95 %", "mm"),

@@ -7,6 +7,7 @@ and dotted lines in black are the thesis's numbers.
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -45,12 +46,7 @@ LOST, SHARE = "porosity lost", "share of the fines per 0.25 mm"
 
 
 class Sources(NamedTuple):
-    """What figures are drawn from.
-
-    Attributes:
-        runs: examined runs by specimen, one a seed.
-        results: results.csv.
-    """
+    """What figures are drawn from: examined runs by specimen, one a seed, and results.csv."""
 
     runs: Mapping[str, Sequence[Run]]
     results: pd.DataFrame
@@ -131,10 +127,7 @@ def _style(runs: Sequence[Run]) -> dict[str, str]:
     return {"colour": COLOURS[int(number)], "label": f"{number}: fines {across} mm{seeds}"}
 
 
-# ------------------------------------------------------------------------------------------------
-# The kinds of plot.
-
-
+# ---- The kinds of plot.
 def _by_depth(run: Run, name: str) -> tuple[Array, Array]:
     """Edges (B+1,) mm and values (B,) of a quantity along depth."""
     if name == LOST:
@@ -245,13 +238,8 @@ def _sections(figure: Any, panel: Any, sources: Sources) -> None:
             slabs = [getattr(run, laws).sections for run in runs]
             edges = 1e3 * np.array([slabs[0][0].x_lo, *(one.x_hi for one in slabs[0])])
             for where, line in (("", "-"), ("_inplace", ":")):
-                rows = [
-                    [
-                        getattr(s, f"k_damaged{where}") / getattr(s, f"k_initial{where}")
-                        for s in one
-                    ]
-                    for one in slabs
-                ]
+                after, before = (attrgetter(f"k_{one}{where}") for one in ("damaged", "initial"))
+                rows = [[after(slab) / before(slab) for slab in one] for one in slabs]
                 _stairs(axes, edges, rows, line=line, **style | ({"label": ""} if where else {}))
             given = 1.0 - np.array(reductions(thesis_of(specimen)))
             if laws == "thesis" and len(given):
@@ -308,10 +296,7 @@ def _scan(figure: Any, panel: Any, sources: Sources) -> None:
     _finish(figure, panel, columns=2)
 
 
-# ------------------------------------------------------------------------------------------------
-# Spheres seen from the side.
-
-
+# ---- Spheres seen from the side.
 def middle_slab(spheres: Snapshot) -> Snapshot:
     """Spheres centred less than the largest grain diameter behind the middle plane, along y."""
     behind = spheres.position[:, 1] - spheres.box[1].mean()

@@ -70,10 +70,7 @@ def share(part: Array, weights: Any = 1.0) -> float:
     return float(np.sum(weights[part])) / total if total > 0 else math.nan
 
 
-# ------------------------------------------------------------------------------------------------
-# Numbers of a whole run: results.csv.
-
-
+# ---- Numbers of a whole run: results.csv.
 def deep_near_wall(run: Run) -> float:
     """Share of the fines beyond 1 mm centred within a mean grain radius of a side wall."""
     (low, high), *sides = run.state.damaged.box
@@ -166,9 +163,7 @@ def result_rows(run: Run) -> list[dict[str, Any]]:
     return rows
 
 
-# ------------------------------------------------------------------------------------------------
-# The first millimetre: statistics.csv.
-
+# ---- The first millimetre: statistics.csv.
 WHOLE = "pores of four grains, throats between two such"
 CUT = "with those cut by a face, by the part inside"
 
@@ -350,10 +345,7 @@ def statistics(run: Run) -> Iterator[dict[str, Any]]:
             }
 
 
-# ------------------------------------------------------------------------------------------------
-# Where fines sit in throats (Shi 2011, Figures 56 and 57): deposition.csv.
-
-
+# ---- Where fines sit in throats (Shi 2011, Figures 56 and 57): deposition.csv.
 def fines_in_class(section: Section, between: tuple[float, float]) -> Mapping[str, Array]:
     """The K pairs of a fine and a throat of porosity in [low, high) that it reaches.
 

@@ -22,10 +22,8 @@ from fdnet.files import write_bytes, write_text
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from validation.thesis.published import TABLE3, rows_in
 
-# ------------------------------------------------------------------------------------------------
-# The plan.
 
-
+# ---- The plan.
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Planned:
     """One run: a shipped case with a seed and perhaps a changed setting, from plan.csv.
@@ -88,10 +86,7 @@ def planned(*, quick: bool = False) -> list[Planned]:
     return [*runs.values()]
 
 
-# ------------------------------------------------------------------------------------------------
-# The runs.
-
-
+# ---- The runs.
 def make_runs(
     plan: Sequence[Planned], states: Path, runs: Path, *, jobs: int, show: bool
 ) -> list[str]:
@@ -141,10 +136,7 @@ def _value(text: str) -> Any:
         return text
 
 
-# ------------------------------------------------------------------------------------------------
-# The states.
-
-
+# ---- The states.
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class State:
     """A specimen before and after its invasion.
