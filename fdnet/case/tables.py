@@ -369,10 +369,11 @@ class Run(Part):
     """Overlap of a fine, over the smaller diameter, above which `on_overlap` applies."""
     on_overlap: Literal["warn", "stop"] = "warn"
     """What follows then: a warning ("warn"), or the run stops with its state kept ("stop")."""
-    time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] = 0.2
+    time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] | None = None
     """Time step over sqrt(m/k) of the lightest sphere and stiffest contact. Up to 0.3 is stable
     for linear contacts without rolling friction and with damping ratios up to 0.48; all others
-    take at most 0.2."""
+    take at most 0.2. When absent: 0.2; the largest that is stable where springs grow with the
+    load (stiffness "auto", field "network")."""
     time_step_s: Positive | None = None
     """Time step of the invasion, instead of `time_step_factor`."""
     duration_ms: Positive | None = None

@@ -264,6 +264,15 @@ def largest_factor(case: Case, contacts: dict[str, Contact]) -> float:
     return max(SAFE_FACTOR, min(stable, CONTACT_STEP_LIMIT))
 
 
+def step_factor(case: Case, contacts: dict[str, Contact]) -> float:
+    """Time step over sqrt(m/k): the one given, or `SAFE_FACTOR`.
+
+    Where springs grow with the load it is the largest that is stable.
+    """
+    usual = largest_factor(case, contacts) if rises(case) else SAFE_FACTOR
+    return usual if case.run.time_step_factor is None else case.run.time_step_factor
+
+
 def time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
     """The step, s: the one given, or `run.time_step_factor` of sqrt(m/k).
 
@@ -273,14 +282,14 @@ def time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
     bound, given = contact_step(case, contacts), case.run.time_step_s
     largest = largest_factor(case, contacts)
     if given is None:
-        if case.run.time_step_factor > largest:
+        if step_factor(case, contacts) > largest:
             most = math.floor(largest * 1e3) / 1e3
             raise CaseError(
                 f"run.time_step_factor: {case.run.time_step_factor:g} is above {largest:.3g}, the "
                 "largest that is stable with the damping_ratio, contact.model and "
                 f"contact.rolling_friction of this case; take at most {most:g}"
             )
-        derived = case.run.time_step_factor * bound
+        derived = step_factor(case, contacts) * bound
         return derived if case.drag.scheme == "implicit" else min(derived, DRAG_WARNING * tau)
     if given > largest * bound * _ROUNDING:
         raise CaseError(
@@ -432,8 +441,8 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
     if case.run.stiffness_N_m != "auto":
         return case
 
-    def stiff(value: float) -> AnyCase:
-        run = case.run.model_copy(update={"stiffness_N_m": value})
+    def stiff(value: float, **more: float) -> AnyCase:
+        run = case.run.model_copy(update={"stiffness_N_m": value, **more})
         return case.model_copy(update={"run": run})
 
     soft = stiff(DEFAULT_STIFFNESS)
@@ -441,7 +450,8 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
         return soft
     porosity = target_porosity(soft)
     flow = velocity_of(soft, porosity)
-    contact = contacts_of(soft, flow.interstitial)["grain-fine"]
+    contacts = contacts_of(soft, flow.interstitial)
+    contact, factor = contacts["grain-fine"], step_factor(case, contacts)
     borne = deposit_pressure(soft, flow, porosity)
     deep = overlaps_of(soft, contact, flow, drive_in(soft, flow), porosity, borne)
     held, struck = (1.5, 2.5) if soft.contact.model == "hertz" else (1.0, 2.0)
@@ -451,4 +461,5 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
         (deep.deposit / PRESSED) ** held * (STARTING if start and rises(case) else 1.0),
         (deep.impact / PRESSED) ** struck,
     )
-    return stiff(two_digits_up(raised * DEFAULT_STIFFNESS))
+    number = two_digits_up(raised * DEFAULT_STIFFNESS)
+    return stiff(number, time_step_factor=factor) if start and rises(case) else stiff(number)

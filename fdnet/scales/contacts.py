@@ -124,6 +124,10 @@ LEAST: Mapping[str, float] = {"hooke": 1e-6, "hertz": 0.0501}
 """Least restitution by contact model, below which nothing is lowered further. LIGGGHTS's Hertz
 model takes 0.05 and less for an error; for linear contacts it keeps the damping ratio below 1."""
 
+LEFT = 0.18
+"""Restitution that is left to linear contacts where the flow follows the deposit, so that the
+longest step is stable (damping ratio 0.48): drag has stopped a fine before it could rebound."""
+
 
 def pair_stokes(mass: float, radius: float, velocity: float, viscosity: float) -> float:
     """m_eff v / (6 pi mu R*^2), the impact Stokes number of a pair.
@@ -324,7 +328,17 @@ def _damping_and_stokes(
     radius = pair_radius(case, pair, case.spheres["fine"].mean_radius_m)
     mass = _effective_mass(case, pair)
     stokes = pair_stokes(mass, radius, velocity, case.fluid.viscosity_Pa_s)
-    return wet_ratio(dry, stokes, least=LEAST[case.contact.model]), stokes
+    return wet_ratio(dry, stokes, least=least_restitution(case)), stokes
+
+
+def least_restitution(case: Case) -> float:
+    """Restitution below which the liquid lowers nothing further."""
+    least = LEAST[case.contact.model]
+    return max(least, LEFT) if _follows(case) and case.contact.model == "hooke" else least
+
+
+def _follows(case: Case) -> bool:
+    return isinstance(case, InvasionCase) and case.drag.field == "network"
 
 
 def material_of(case: Case, name: str, factor: float) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from fdnet.scales.clock import (
     contact_step,
     present_share,
     spoken_time,
+    step_factor,
     supplied_solids,
 )
 from fdnet.scales.drag import BRIDGING
@@ -158,7 +159,7 @@ def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = 
             f"{refusal}, most of it packing {grain_count(case):.3g} grains: take a smaller box, "
             "or raise run.max_hours"
         )
-    sound = case.run.time_step_factor * contact_step(case, scales.contacts)
+    sound = step_factor(case, scales.contacts) * contact_step(case, scales.contacts)
     if case.run.time_step_s is not None:
         reason, remedy = "as given", "raise run.time_step_s"
     elif scales.time_step < 0.999 * sound:

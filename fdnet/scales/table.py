@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from fdnet.case.case import Case, InvasionCase
 from fdnet.scales.contacts import (
     LARGEST_CHAIN,
-    LEAST,
     Contact,
+    least_restitution,
     material_of,
     pull_off_of,
     rayleigh_time,
@@ -157,7 +157,7 @@ def _contact_rows(case: Case, scales: Scales) -> Iterator[Quantity]:
     model = case.contact.model
     yield row(f"{model}_factor", scales.stiffness_factor)
     for contact in scales.contacts.values():
-        yield from _rows_of_pair(model, contact)
+        yield from _rows_of_pair(model, contact, least_restitution(case))
     if not isinstance(case, InvasionCase):
         return
     if case.contact.cohesion_J_m3:
@@ -169,7 +169,7 @@ def _contact_rows(case: Case, scales: Scales) -> Iterator[Quantity]:
         yield row("rayleigh", rayleigh_time(radius, density, *material))
 
 
-def _rows_of_pair(model: str, contact: Contact) -> Iterator[Quantity]:
+def _rows_of_pair(model: str, contact: Contact, least: float) -> Iterator[Quantity]:
     pair = contact.pair
     if contact.elastic is not None:
         yield row("hertz_modulus", contact.elastic.modulus, pair=pair)
@@ -178,4 +178,4 @@ def _rows_of_pair(model: str, contact: Contact) -> Iterator[Quantity]:
     yield row(f"{model}_step", 0.2 * contact.step_limit, pair=pair)
     if contact.stokes is not None:
         yield row("pair_stokes", contact.stokes, pair=pair)
-        yield row("restitution", contact.restitution, pair=pair, least=LEAST[model])
+        yield row("restitution", contact.restitution, pair=pair, least=least)
