@@ -55,7 +55,8 @@ def test_the_case_of_a_sand_and_a_mud_is_sized_by_them(median, tmp_path, capsys)
     assert case.fines.sizes.D10_mm == pytest.approx(5e-4 * median)
     assert case.well.radius_mm == 108.0
     text = out.read_text()
-    assert "drainage_radius" not in text and case.well.drainage_radius_m == 100.0
+    assert "drainage_radius" not in text
+    assert case.well.drainage_radius_m == 100.0
     share = f"{100 * case.fines.curve.below:.0f} % of the solids are finer"
     assert (share in text) == (case.fines.cut_um is not None)
     assert "assumed" in text
