@@ -450,7 +450,7 @@ def steps_after(case: InvasionCase, steps: int, seen: Sequence[float]) -> int:
     One overlap in ten may be larger: a single impact is no load. An overlap goes with the
     stiffness k to the power -1 (Hertz -2/3), the step with k to -1/2.
     """
-    overlap = sorted(seen)[9 * (len(seen) - 1) // 10]
+    overlap = sorted(seen)[math.ceil(9 * (len(seen) - 1) / 10)]
     if not rises(case) or overlap <= RAISE_ABOVE * PRESSED:
         return steps
     power = 0.75 if case.contact.model == "hertz" else 0.5
