@@ -375,12 +375,12 @@ class InvadeStage(ChunkedStage):
             return scales
         rows = read_rows(self.folder)
         begun = max((row.step for row in rows if row.step < last.step), default=0)
-        seen = [one for one in read_watch(self.folder) if begun < one.step <= last.step]
+        watched = (one for one in read_watch(self.folder) if begun < one.step <= last.step)
+        seen = [one.fraction for one in watched]
         if not seen:
             state = state_at(self.folder, last, case, scales, self.grains)
-            seen.append(overlap_in(case, state))
-        steps = steps_after(case, scales, last.step - begun, deepest_of(seen).fraction)
-        return stiffened(case, scales, steps)
+            seen.append(overlap_in(case, state).fraction)
+        return stiffened(case, scales, steps_after(case, last.step - begun, seen))
 
     def look_at(self, history: Sequence[Checkpoint], overlaps: Sequence[Deepest]) -> None:
         """Raise LiggghtsError when a fine overlapped too much and `run.on_overlap` is "stop".
