@@ -299,7 +299,7 @@ def solved_anew(name: str, *, quick: bool = False) -> Iterator[dict[str, Any]]:
 
 CAKES = Path(__file__).with_name("cakes.npz")
 CAKE_SIDES = (False, True, True)
-CAKE_CELLS = (4.5, 6.75)
+CAKE_CELLS = (3.0, 4.5)
 """Cells of the two grids across the Sauter mean radius of the fines."""
 
 
