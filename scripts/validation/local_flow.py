@@ -6,6 +6,7 @@ d1 d2 / 2; the exponent was chosen on the deposits that the study does not put a
 conductance of a face is that of its parts in series and side by side, at half the spacing.
 """
 
+from collections.abc import Sequence
 from math import ceil, floor, sqrt
 from typing import NamedTuple
 
@@ -41,7 +42,7 @@ def local_flow(
     diameter: float,
     cells: float,
     kept: "Local | None" = None,
-    carried: list[Array] | None = None,
+    carried: Sequence[Array] | None = None,
 ) -> Local:
     """The flow of mean 1 along x around `spheres`, on a grid of `cells` across a `diameter` m.
 
@@ -62,7 +63,7 @@ def local_flow(
     open_ = kept.conductance if kept else _conductances(spheres, lattice, FARTHEST * diameter)
     step = lattice.spacing / lattice.unit
     matrix, cell = _matrix(open_, step)
-    driven = _balanced(matrix, cell, open_, [open_[0], None, None], step)
+    driven = _balanced(matrix, cell, open_, [open_[0], 0 * open_[1], 0 * open_[2]], step)
     mean = driven[0].mean()
     driven = [part / mean for part in driven]
     if carried is not None:
@@ -102,7 +103,7 @@ def _conductances(spheres: Snapshot, lattice: Lattice, farthest: float) -> list[
     return result
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True)
 def _mark(centre: Array, radius: Array, step: Array, farthest: float, near: Array) -> None:
     """Sets the two least distances to a sphere, at most `farthest`; y and z are periodic."""
     low, high = np.zeros(3, np.int64), np.zeros(3, np.int64)
@@ -144,13 +145,11 @@ def _balanced(
     matrix: sparse.csr_array,
     scale: Array,
     open_: list[Array],
-    flow: list[Array | None],
+    flow: Sequence[Array],
     step: Array,
 ) -> list[Array]:
-    """A `flow` through the faces less what the pressures take from it to keep the volume."""
-    parts = [
-        np.zeros_like(one) if part is None else part for one, part in zip(open_, flow, strict=True)
-    ]
+    """A `flow` through the open faces less what the pressures take to keep the volume."""
+    parts = [part * (one > 0) for one, part in zip(open_, flow, strict=True)]
     gain = sum((np.roll(part, -1, axis) - part) / step[axis] for axis, part in enumerate(parts))
     pressure = scale * cg(matrix, -scale * np.ravel(gain), rtol=TOLERANCE, maxiter=2000)[0]
     field = pressure.reshape(open_[0].shape)
