@@ -159,10 +159,8 @@ def parse_until(text: str) -> Until:
     """
     match = _UNTIL.fullmatch(text)
     if match is None or not 0 < (width := float(match[2])) < float("inf"):
-        raise CaseError(
-            f"--until {text!r}: expected a quantity and the half of its band, e.g. "
-            "'k_reduction ± 5 %' or 'k_damaged_m2 +- 10 %'"
-        )
+        wanted = "a quantity and the half of its band, e.g. 'k_reduction ± 5 %'"
+        raise CaseError(f"--until {text!r}: expected {wanted} or 'k_damaged_m2 +- 10 %'")
     percent = match[3] == "%"
     relative = percent and results.SHARES.search(match[1]) is None
     return Until(match[1], width / 100 if percent else width, relative)

@@ -40,7 +40,7 @@ class Compared:
 
     @property
     def table(self) -> Any:
-        """table.csv as a pandas table: one row for each run, lengths in m and permeabilities in m2."""
+        """table.csv by pandas: a row for each run, lengths in m and permeabilities in m2."""
         columns = ("run", "variant", "seed", "status")
         return read_table(self.path / results.TABLE, columns, texts=None)
 
@@ -61,9 +61,8 @@ def write_comparison(
     design = [{"name": mud.name, "state": mud.state} for mud in muds]
     more = {"design": design, "targets": limits} if limits else {}
     summary = results.write_summary(comparison, more)
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    trim: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True}
+    environment = Environment(autoescape=True, undefined=StrictUndefined, **trim)
     shown = dict.fromkeys([comparison.ranked_by, *SHOWN])
 
     def link(run: results.Entry) -> str:
@@ -223,9 +222,8 @@ def _draw_ranking(comparison: Comparison) -> dict[str, str] | None:
         values = factor * np.array(list(comparison.values(name, quantity).values()))
         band = comparison.band(name, quantity)
         axes.plot(values, np.full(len(values), place), "o", ms=4, color="0.6", zorder=2)
-        axes.hlines(
-            place, factor * band.low, factor * band.high, color=COLOURS[0], lw=5, alpha=0.4
-        )
+        ends = (factor * band.low, factor * band.high)
+        axes.hlines(place, *ends, color=COLOURS[0], lw=5, alpha=0.4)
         axes.plot(factor * band.mean, place, "|", ms=16, mew=2.5, color=COLOURS[0], zorder=3)
     axes.set_yticks(range(len(names)), [_short(name) for name in names])
     axes.invert_yaxis()
