@@ -63,7 +63,7 @@ class Compared:
         """table.csv: one row for each run, lengths in m and permeabilities in m2."""
         from fdnet.report.tables import read_table
 
-        return read_table(self.path / TABLE, ("run", "variant", "seed", "status"), texts=None)
+        return read_table(self.path / TABLE, ("run", "variant", "seed", "status"))
 
     def __str__(self) -> str:
         """The ranking and the differences."""
