@@ -429,6 +429,13 @@ def _exact_numbers() -> dict[str, Any]:
     return {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 
 
+def empty_table(columns: Sequence[str]) -> "pd.DataFrame":
+    """A table of no rows."""
+    import pandas as pd
+
+    return pd.DataFrame(columns=list(columns), dtype=float)
+
+
 def read_summary(path: Path) -> dict[str, Any]:
     """The mapping of summary.json. Raises CaseError when it is missing or cannot be read."""
     return read_json(path, Summary, noun="summary of an fdnet run", advice=_again(path))

@@ -16,6 +16,7 @@ from fdnet.network.network import Network, build_network
 from fdnet.network.states import all_conductances
 from fdnet.report.tables import (
     LAYER_COLUMNS,
+    empty_table,
     read_summary,
     read_table,
     to_openpnm,
@@ -72,11 +73,9 @@ class FinishedRun:
 
         They are from the network of all spheres; where that was not solved there are no rows.
         """
-        import pandas as pd
-
         if "layers.csv" in self.manifest["files"]:
             return self._table("layers")
-        return pd.DataFrame(columns=list(LAYER_COLUMNS), dtype=float)
+        return empty_table(LAYER_COLUMNS)
 
     @cached_property
     def pores(self) -> "pd.DataFrame":
@@ -95,10 +94,8 @@ class FinishedRun:
         It joins history.csv of the run folder with the counts that the deck wrote to
         invade/history.csv. A run without fines has no history: the table has no rows.
         """
-        import pandas as pd
-
         if not isinstance(self.case, InvasionCase):
-            return pd.DataFrame(columns=["time_s", *HISTORY_COLUMNS], dtype=float)
+            return empty_table(["time_s", *HISTORY_COLUMNS])
         check_one(self.path / "invade", self.manifest["invade"], "history.csv", START_OVER)
         counts = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
         return self._table("history").merge(counts, on="step", how="left")
