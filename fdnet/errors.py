@@ -241,24 +241,3 @@ def by_importance(sentences: Iterable[str]) -> list[str]:
         return order.get(key.rstrip(")"), MIDDLE) if found else MIDDLE
 
     return sorted(dict.fromkeys(sentences), key=rank)
-
-
-def page() -> str:
-    """The page of all warnings."""
-    import textwrap
-
-    def filled(text: str) -> list[str]:
-        return textwrap.wrap(text, 99, break_on_hyphens=False, break_long_words=False)
-
-    opening = (
-        "A warning names something that is valid but doubtful, and the run goes on. It ends with "
-        "its place on this page, which says what follows from it and what to do. What `fdnet "
-        "check` finds odd about sizes, speed and supply says all this itself."
-    )
-    lines = ["# Warnings", "", *filled(opening)]
-    for key, entry in catalogue().items():
-        title, *said = (
-            one[0].upper() + one[1:] for one in (key.replace("-", " "), entry.follows, entry.do)
-        )
-        lines += ["", f"## {title}", "", *filled(f"{'. '.join(said)}. [More](../{entry.read})")]
-    return "\n".join(lines) + "\n"

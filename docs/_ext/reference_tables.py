@@ -8,13 +8,14 @@ Each table stands between two comments, `<!-- case-keys grains -->` (or `command
 
 import re
 import sys
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
 from case_keys import key_rows
 from command_options import own_rows, shared_rows
 
-from fdnet.errors import PAGE, page
+from fdnet.errors import PAGE, catalogue
 
 PAGES = ("docs/reference/case.md", "docs/reference/commands.md")
 BLOCK = re.compile(
@@ -26,6 +27,26 @@ BLOCK = re.compile(
 def filled(page: str) -> str:
     """The text of a page with the tables of the models and parsers between its comments."""
     return BLOCK.sub(lambda block: f"{block[1]}\n{_table(block[2], block[3])}\n{block[4]}", page)
+
+
+def warnings_page() -> str:
+    """The page of all warnings."""
+
+    def filled(text: str) -> list[str]:
+        return textwrap.wrap(text, 99, break_on_hyphens=False, break_long_words=False)
+
+    opening = (
+        "A warning names something that is valid but doubtful, and the run goes on. It ends with "
+        "its place on this page, which says what follows from it and what to do. What `fdnet "
+        "check` finds odd about sizes, speed and supply says all this itself."
+    )
+    lines = ["# Warnings", "", *filled(opening)]
+    for key, entry in catalogue().items():
+        title, *said = (
+            one[0].upper() + one[1:] for one in (key.replace("-", " "), entry.follows, entry.do)
+        )
+        lines += ["", f"## {title}", "", *filled(f"{'. '.join(said)}. [More](../{entry.read})")]
+    return "\n".join(lines) + "\n"
 
 
 def _table(kind: str, name: str | None) -> str:
@@ -46,7 +67,7 @@ def written(root: Path) -> list[tuple[Path, str]]:
     pages = [root / name for name in PAGES]
     return [
         *((path, filled(path.read_text(encoding="utf-8"))) for path in pages),
-        (root / PAGE, page()),
+        (root / PAGE, warnings_page()),
     ]
 
 

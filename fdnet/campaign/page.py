@@ -42,7 +42,7 @@ class Compared:
     def table(self) -> Any:
         """table.csv by pandas: a row for each run, lengths in m and permeabilities in m2."""
         columns = ("run", "variant", "seed", "status")
-        return read_table(self.path / results.TABLE, columns, texts=None)
+        return read_table(self.path / results.TABLE, columns)
 
     def __str__(self) -> str:
         """The ranking and the differences."""

@@ -6,9 +6,10 @@ from itertools import product
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, cg
 
 from fdnet.errors import MechanicsError
-from fdnet.network.flow.solver import conjugate_gradients, dissected, factored
+from fdnet.network.flow.solver import dissected, factored
 from fdnet.spheres.geometry import touching_pairs, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
@@ -443,19 +444,19 @@ def iterative_solver(matrix: sparse.csr_matrix) -> SolveLoad:
     def better(missing: Array) -> Array:
         return np.einsum("nij,nj->ni", inverse, missing.reshape(-1, 6)).ravel()
 
-    def norm(missing: Array) -> float:
-        return float(np.linalg.norm(missing))
-
     def solve(load: Array) -> Array:
-        within = WITHIN * norm(load)
-        moved = conjugate_gradients(
-            matrix, load, better, within=within, size=norm, steps=MOST_STEPS
+        moved, left = cg(
+            matrix,
+            load,
+            rtol=WITHIN,
+            maxiter=MOST_STEPS,
+            M=LinearOperator(matrix.shape, better, dtype=float),
         )
-        if np.all(np.isfinite(moved)):
-            return moved
-        raise MechanicsError(
-            f"solve of {len(load) // 6} grains: the residual is not {within:.1e} N after "
-            f"{MOST_STEPS} steps; take a smaller or a stiffer pack"
-        )
+        if left:
+            raise MechanicsError(
+                f"solve of {len(load) // 6} grains: the residual is not {WITHIN:g} of the load "
+                f"after {MOST_STEPS} steps; take a smaller or a stiffer pack"
+            )
+        return moved
 
     return solve

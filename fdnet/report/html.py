@@ -2,7 +2,6 @@
 
 import base64
 import html
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -194,7 +193,7 @@ def stokes_html(rows: Sequence[Mapping[str, Any]]) -> str:
 
 DASH = "–"
 LEADING, STILL = "depth.png", "spheres_3d.png"
-"""The figure that stands at the top, and the one in place of the 3-D view."""
+"""The figure that stands at the top, and the picture of the specimen."""
 SECTION_COLUMNS = (  # key, heading, unit, factor to that unit
     ("section", "section", "", None),
     ("x_lo_m", "from", "mm", 1e3),
@@ -220,7 +219,6 @@ class ReportParts:
     Attributes:
         figures: path and caption of each figure.
         case_words: the case in sentences.
-        view: spheres of the 3-D view (`fdnet.report.vtk.view_of`); None: a picture alone.
         case_text: the resolved case as TOML.
         scales: rows with name, symbol, value, unit, formula and source (objects or mappings).
         versions: version of each program.
@@ -232,7 +230,6 @@ class ReportParts:
 
     figures: Sequence[tuple[Path, str]] = ()
     case_words: Sequence[str] = ()
-    view: Mapping[str, Any] | None = None
     case_text: str = ""
     scales: Sequence[Any] = ()
     versions: Mapping[str, Any] = field(default_factory=dict)
@@ -251,7 +248,6 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
     Raises CaseError for a figure that cannot be read.
     """
     from jinja2 import Environment, StrictUndefined
-    from markupsafe import Markup
 
     page = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
@@ -265,15 +261,6 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
         {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
         for file, caption in parts.figures
     ]
-    # what the page writes without escaping is made here
-    view = (
-        {}
-        if parts.view is None
-        else {
-            "view_json": Markup(json.dumps(dict(parts.view))),
-            "view_script": Markup(_own("view.js")),
-        }
-    )
     text = page.from_string(_own("report.html.j2")).render(
         summary=summary,
         parts=parts,
@@ -281,7 +268,6 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
         leading=[one for one in figures if one["name"] == LEADING],
         still=next((one for one in figures if one["name"] == STILL), None),
         headline=list(facts(summary)) if "supplied_count" in summary else [],
-        **view,
     )
     return write_text(path, text)
 

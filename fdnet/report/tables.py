@@ -153,21 +153,20 @@ def write_profile(path: str | Path, analysis: "Analysis") -> Path:
     return write_rows(path, columns)
 
 
+LAYER_COLUMNS = (
+    *("x_lo_m", "x_hi_m", "k_initial_m2", "k_damaged_m2"),
+    *("pressure_drop_initial", "pressure_drop_damaged", "fines_count"),
+)
+
+
 def write_layers(path: str | Path, layers: "Layers") -> Path:
     """One row for each layer, in place, from the network of all spheres.
 
     The pressure drops are over that of the specimen; empty where nothing flows.
     """
-    columns = {
-        "x_lo_m": layers.edges[:-1],
-        "x_hi_m": layers.edges[1:],
-        "k_initial_m2": layers.k_initial,
-        "k_damaged_m2": layers.k_damaged,
-        "pressure_drop_initial": layers.drop_initial,
-        "pressure_drop_damaged": layers.drop_damaged,
-        "fines_count": layers.fines_count,
-    }
-    return write_rows(path, columns)
+    edges, k = layers.edges, (layers.k_initial, layers.k_damaged)
+    columns = (edges[:-1], edges[1:], *k, layers.drop_initial, layers.drop_damaged)
+    return write_rows(path, dict(zip(LAYER_COLUMNS, (*columns, layers.fines_count), strict=True)))
 
 
 def write_pores(path: str | Path, analysis: "Analysis") -> Path:
@@ -310,28 +309,6 @@ def _plain(value: Any, where: str, refused: list[str]) -> Any:
 # Tables and JSON of a run folder, read back strictly.
 
 
-COLUMNS: Mapping[str, tuple[str, ...]] = {
-    "sections": _SECTION,
-    "profile": (*_SECTION[1:5], "porosity_reduction", "fines_fraction"),
-    "layers": (
-        *("x_lo_m", "x_hi_m", "k_initial_m2", "k_damaged_m2"),
-        *("pressure_drop_initial", "pressure_drop_damaged", "fines_count"),
-    ),
-    "pores": (
-        *("pore", "pore_coords_0_m", "pore_coords_1_m", "pore_coords_2_m"),
-        *("pore_radius_m", "pore_volume_m3", "pressure_initial", "pressure_damaged"),
-    ),
-    "throats": (
-        *("throat", "throat_conns_0", "throat_conns_1", "throat_radius_m", "throat_length_m"),
-        *("blocked", "law_used", "conductance_initial_m3", "conductance_damaged_m3"),
-        *("flux_initial_m3", "flux_damaged_m3"),
-    ),
-}
-"""Columns that a table of a run must have; further ones are read too."""
-HISTORY_COLUMNS = ("chunk", "step", "upstream", "invaded", "passed")
-TEXT_COLUMNS = ("law_used",)
-
-
 class JsonObject(BaseModel):
     """What a JSON file must hold: its keys with their types; further keys are not looked at."""
 
@@ -424,22 +401,13 @@ def _problem(error: ValidationError) -> str:
     return f"{key}: {first['msg'][0].lower()}{first['msg'][1:]}{shown}"
 
 
-def read_table(
-    path: Path,
-    columns: Sequence[str],
-    *,
-    rows: int | None = None,
-    texts: Sequence[str] | None = TEXT_COLUMNS,
-) -> "pd.DataFrame":
+def read_table(path: Path, columns: Sequence[str] = ()) -> "pd.DataFrame":
     """The CSV table at `path`, SI units as its column names say.
 
-    `texts` are columns that may hold texts; None allows them in any. Raises CaseError when it is
-    missing or malformed, lacks one of `columns`, holds text where a number is expected, or has
-    another number of rows than `rows`.
+    Raises CaseError when it is missing or malformed, or lacks one of `columns`.
     """
     import pandas as pd
 
-    problem = ""
     if not path.is_file():
         problem = "is no ordinary file" if path.exists() else "is missing"
         raise CaseError(f"{path}: {problem}; {_again(path)}")
@@ -449,20 +417,8 @@ def read_table(
         why = f"cannot be read as a table ({str(error).strip()})"
         raise CaseError(f"{path}: {why}; {_again(path)}") from error
     missing = [name for name in columns if name not in table.columns]
-    allowed = table.columns if texts is None else texts
-    worded = [
-        name
-        for name in table.columns
-        if name not in allowed and not pd.api.types.is_numeric_dtype(table[name])
-    ]
     if missing:
-        problem = f"has no column {', '.join(missing)}"
-    elif worded:
-        problem = f"column {worded[0]} holds a value that is no number"
-    elif rows is not None and len(table) != rows:
-        problem = f"has {len(table)} rows, expected {rows} by summary.json"
-    if problem:
-        raise CaseError(f"{path}: {problem}; {_again(path)}")
+        raise CaseError(f"{path}: has no column {', '.join(missing)}; {_again(path)}")
     return table
 
 
@@ -477,7 +433,7 @@ def empty_table(columns: Sequence[str]) -> "pd.DataFrame":
     """A table of no rows."""
     import pandas as pd
 
-    return pd.DataFrame({name: pd.Series(dtype=float) for name in columns})
+    return pd.DataFrame(columns=list(columns), dtype=float)
 
 
 def read_summary(path: Path) -> dict[str, Any]:

@@ -6,7 +6,6 @@ Every sentence and every headline number of a run is worded here, once.
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -374,20 +373,6 @@ def text_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     yield f"fdnet run {summary['case']} in {path}"
     yield from summary_lines(summary)
     yield seconds_line(summary)
-
-
-def html_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
-    """The answer, headline numbers and the table of sections for a notebook."""
-    yield f"<p><b>fdnet run {escape(str(summary['case']))}</b> in {escape(str(path))}</p>"
-    yield from (f"<p>{escape(text)}</p>" for text in _said(summary))
-    rows = [
-        (f"<th>{escape(one.name)}</th>", f"<td>{escape(one.text)}</td>") for one in facts(summary)
-    ]
-    yield "<table>" + "\n".join(f"<tr>{''.join(row)}</tr>" for row in rows) + "</table><table>"
-    yield "<tr>" + "".join(f"<th>{escape(name)}</th>" for name in _HEAD) + "</tr>"
-    for row in summary["sections"]:
-        yield "<tr>" + "".join(f"<td>{cell}</td>" for cell in section_cells(row)) + "</tr>"
-    yield "</table>"
 
 
 def section_cells(row: Mapping[str, Any]) -> tuple[str, ...]:

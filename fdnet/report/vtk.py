@@ -1,9 +1,8 @@
-"""ParaView files (.vtp, .pvd) of a run, written and read, and the view in the report."""
+"""ParaView files (.vtp, .pvd) of a run, written and read."""
 
-import base64
 import errno
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,6 @@ import numpy as np
 
 from fdnet.errors import CaseError
 from fdnet.files import write_bytes, write_text
-from fdnet.report.picture import UPSTREAM_SHOWN
 from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -210,45 +208,3 @@ def read_balls(path: Path) -> Any:
 
     ball = pv.Sphere(radius=1.0, theta_resolution=ROUNDNESS, phi_resolution=ROUNDNESS)
     return read_mesh(path).glyph(geom=ball, scale="radius_m", orient=False)
-
-
-# ------------------------------------------------------------------------------------------------
-# The spheres of the page's 3-D view, as JSON that its script reads.
-
-
-MM, MICRON = 1e3, 1e6
-MOST_IN_VIEW = 40_000
-"""Spheres up to which a page has a 3-D view: half a megabyte."""
-VIEW_STEPS = 65535
-
-
-def view_of(spheres: Snapshot) -> Mapping[str, Any] | None:
-    """Grains and fines for the view; None where there are more than `MOST_IN_VIEW`, or none.
-
-    `data` is base64 of (N, 4) unsigned 16-bit numbers, little endian, grains first: x, y and z
-    from `low` to `high` (mm), and the radius from 0 to `radius` (mm). `grains` is their number.
-    """
-    length = float(np.ptp(spheres.box[0]))
-    shown = spheres.position[:, 0] > spheres.box[0, 0] - UPSTREAM_SHOWN * length
-    grains, fines = spheres.grains(), spheres.where(shown).fines()
-    if not 0 < len(grains) + len(fines) <= MOST_IN_VIEW:
-        return None
-    position = np.concatenate([grains.position, fines.position]) * MM
-    radius = np.concatenate([grains.radius, fines.radius]) * MM
-    low, high = position.min(axis=0), position.max(axis=0)
-
-    def steps(value: Array, start: Any, end: Any) -> Array:
-        span = np.where(np.asarray(end) > start, np.asarray(end) - start, 1.0)
-        return np.rint((value - start) / span * VIEW_STEPS)
-
-    table = np.column_stack([steps(position, low, high), steps(radius, 0.0, radius.max())])
-    return {
-        "grains": len(grains),
-        "spheres": len(radius),
-        "low": low.tolist(),
-        "high": high.tolist(),
-        "radius": float(radius.max()),
-        "box": (np.asarray(spheres.box) * MM).tolist(),
-        "one_size": len(np.unique(np.round(fines.radius * MICRON, 6))) <= 1,
-        "data": base64.b64encode(table.astype("<u2").tobytes()).decode("ascii"),
-    }

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,14 +15,13 @@ from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.states import all_conductances
 from fdnet.report.tables import (
-    COLUMNS,
-    HISTORY_COLUMNS,
+    LAYER_COLUMNS,
     empty_table,
     read_summary,
     read_table,
     to_openpnm,
 )
-from fdnet.report.text import html_lines, text_lines
+from fdnet.report.text import text_lines
 from fdnet.report.vtk import read_balls, read_mesh
 from fdnet.run.folder import ANALYSE_AGAIN, START_OVER, check_one, finished_manifest
 from fdnet.spheres.readers import read_spheres
@@ -30,13 +30,15 @@ from fdnet.spheres.snapshot import Array, Snapshot
 if TYPE_CHECKING:
     import pandas as pd
 
+HISTORY_COLUMNS = ("chunk", "step", "upstream", "invaded", "passed")
+"""Of invade/history.csv, which the deck writes."""
 State = Literal["initial", "damaged"]
 """Without the fines, or with them."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FinishedRun:
-    """A finished run. Tables are read when they are first used and checked against the summary.
+    """A finished run. Tables are read when they are first used, as the run wrote them.
 
     Attributes:
         path: the run folder.
@@ -58,12 +60,12 @@ class FinishedRun:
     @cached_property
     def sections(self) -> "pd.DataFrame":
         """One row for each slab along the flow, with edges (m), porosity, k (m2) and fines."""
-        return self._table("sections", len(self.summary["sections"]))
+        return self._table("sections")
 
     @cached_property
     def profile(self) -> "pd.DataFrame":
         """One row for each bin of depth, with edges (m), porosities and share of the fines."""
-        return self._table("profile", None)
+        return self._table("profile")
 
     @cached_property
     def layers(self) -> "pd.DataFrame":
@@ -72,18 +74,18 @@ class FinishedRun:
         They are from the network of all spheres; where that was not solved there are no rows.
         """
         if "layers.csv" in self.manifest["files"]:
-            return self._table("layers", None)
-        return empty_table(COLUMNS["layers"])
+            return self._table("layers")
+        return empty_table(LAYER_COLUMNS)
 
     @cached_property
     def pores(self) -> "pd.DataFrame":
         """One row for each pore, with centre (m), radius (m), volume (m3), fines, pressures."""
-        return self._table("pores", self.summary["pores"])
+        return self._table("pores")
 
     @cached_property
     def throats(self) -> "pd.DataFrame":
         """One row for each throat, with pores, radius (m), conductances and fluxes (m3), law."""
-        return self._table("throats", self.summary["throats"])
+        return self._table("throats")
 
     @cached_property
     def history(self) -> "pd.DataFrame":
@@ -94,11 +96,9 @@ class FinishedRun:
         """
         if not isinstance(self.case, InvasionCase):
             return empty_table(["time_s", *HISTORY_COLUMNS])
-        counts = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
         check_one(self.path / "invade", self.manifest["invade"], "history.csv", START_OVER)
-        names = ["time_s", "physical_time_s", "step"]
-        times = self._read("history.csv", lambda path: read_table(path, names))
-        return times.merge(counts, on="step", how="left")
+        counts = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
+        return self._table("history").merge(counts, on="step", how="left")
 
     def spheres(self, state: State = "damaged") -> Snapshot:
         """Grains and fines at the end of the run, or the grains alone before it.
@@ -176,8 +176,9 @@ class FinishedRun:
         _check_state(state)
         return self._read(f"spheres_{state}.vtp", read_balls)
 
-    def _table(self, name: str, rows: int | None) -> "pd.DataFrame":
-        return self._read(f"{name}.csv", lambda path: read_table(path, COLUMNS[name], rows=rows))
+    def _table(self, name: str) -> "pd.DataFrame":
+        check_one(self.path, self.manifest, f"{name}.csv", ANALYSE_AGAIN)
+        return read_table(self.path / f"{name}.csv")
 
     def _read(self, name: str, read: Callable[[Path], Any]) -> Any:
         """A file of the run as `read` gives it; CaseError where the run wrote another one."""
@@ -192,7 +193,7 @@ class FinishedRun:
         return f"FinishedRun({self.case.name!r}, {str(self.path)!r})"
 
     def _repr_html_(self) -> str:
-        return "\n".join(html_lines(self.path, self.summary))
+        return f"<pre>{escape(str(self))}</pre>"
 
 
 def _check_state(state: str) -> None:

@@ -3,7 +3,7 @@
 import shlex
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,7 @@ from fdnet.mechanics.of_case import (
 )
 from fdnet.mechanics.triaxial import LoadStep, Triaxial, triaxial
 from fdnet.report.html import put_mechanics
-from fdnet.report.tables import plain_json
+from fdnet.report.tables import plain_json, write_rows
 from fdnet.run.folder import CASE, START_OVER, check_files, is_run_folder, read_record
 from fdnet.run.records import PACK_DUMP, RunOptions
 from fdnet.spheres.dump import read_frame
@@ -122,10 +122,8 @@ def measure_triaxial(
     numbers["seconds"] = time.monotonic() - start
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    names = [one.name for one in fields(LoadStep)]
-    lines = [",".join(_COLUMNS.get(name, name) for name in names)]
-    lines += [",".join(f"{getattr(row, name):.9g}" for name in names) for row in result.rows]
-    write_text(folder / CURVE, "\n".join(lines) + "\n")
+    rows = [asdict(row) for row in result.rows]
+    write_rows(folder / CURVE, {_COLUMNS.get(k, k): [row[k] for row in rows] for k in rows[0]})
     draw_stress_strain(result.rows, folder / "stress_strain.png", bonds=result.bonds)
     return numbers
 

@@ -20,7 +20,6 @@ from fdnet.names import AUTO, DEFAULT_LAW, LIGGGHTS_STAGES, STAGES, off_by_facto
 from fdnet.network.warm_up import compiling
 from fdnet.report import html, tables
 from fdnet.report.text import case_words, thesis_law_warning
-from fdnet.report.vtk import view_of
 from fdnet.run.answer import with_answer
 from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
 from fdnet.run.dem_stages import file_warnings, invade_stage, invaded, pack_stage, packed_grains
@@ -382,7 +381,6 @@ def _write_page(
     parts = html.ReportParts(
         figures=figures,
         case_words=list(case_words(case, session.scales)),
-        view=view_of(results.shown),
         case_text=case.toml(),
         scales=scale_rows(case, session.scales),
         versions=programs,

@@ -340,7 +340,7 @@ def read_sections(path: Path) -> list[StokesSection]:
         table = read_table(path, names)[names]
         if not np.isfinite(table.to_numpy(float)).all():
             raise CaseError("a number is not finite")
-    except CaseError as error:
+    except (CaseError, ValueError) as error:
         why = str(error).partition("; ")[0].removeprefix(f"{path}: ")
         raise CaseError(
             f"{path}: cannot be read ({why}), expected numbers below {', '.join(names)}; remove "

@@ -83,8 +83,8 @@ def width_error(width: float, *, periodic: bool) -> float:
 MOST_WIDTH_ERROR = 0.10
 """Error of the permeability by the width of the specimen, from which it is named."""
 ABSURD = 10.0
-"""Velocity over that at a usual well, from which it is named; the square of it where the case gives
-the velocity or a plug."""
+"""Velocity over that at a usual well, from which it is named; the square of it where the case
+gives the velocity or a plug."""
 FINE_SHARE, MOST_FINE_COST = 0.1, 3.0
 """Share of the finest solids, and the time with them over that without, from which it is named."""
 MOST_COARSE = 0.25

@@ -9,9 +9,8 @@ from itertools import count
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.spatial.distance import cdist
 
-from fdnet.errors import CaseError, Doubt
+from fdnet.errors import Doubt
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen, one_line
 
 _ROUNDING = 1e-6
@@ -120,10 +119,9 @@ def inside_others(spheres: Snapshot, periodic: tuple[bool, bool, bool]) -> tuple
 
     The first add nothing to the solid. They may reach out by a thousandth of their radius, so that
     spheres that coincide or touch from within are among them but for the rounding of a file. The
-    one of two that coincide is kept that comes first, a grain before a fine. Whether several
-    spheres cover one together is seen on `_SAMPLES` points of its surface and as many of its
-    inside, from the smallest sphere to the largest. The second are parts of clumps. Of two equal
-    spheres with their centres in each other one is counted.
+    one of two that coincide is kept that comes first, a grain before a fine. One that several
+    others cover together is kept: the tessellation hides it. The second are parts of clumps. Of
+    two equal spheres with their centres in each other one is counted.
     """
     radius, count = spheres.radius, len(spheres)
     wholly, centred = np.zeros((2, count), bool)
@@ -146,45 +144,8 @@ def inside_others(spheres: Snapshot, periodic: tuple[bool, bool, bool]) -> tuple
     holds = distance <= radius[host] - (1 - _INSIDE_ROUNDING) * radius[guest]
     for one, other in zip(host[holds], guest[holds], strict=True):
         wholly[other] |= not wholly[one]
-    for one in sorted({*guest.tolist(), *host.tolist()}, key=lambda one: -rank[one]):
-        if not wholly[one]:
-            near = np.array(tree.query_ball_point(tree.data[one], radius[one] + radius.max()))
-            wholly[one] = _covered(one, near[~wholly[near]], spheres, periodic)
     centred[guest[~wholly[host]]] = True
     return wholly, centred & ~wholly
-
-
-def _covered(
-    one: int, others: Array, spheres: Snapshot, periodic: tuple[bool, bool, bool]
-) -> bool:
-    """Whether the `others` together cover the ball of sphere `one`, in their nearest images."""
-    side = np.ptp(spheres.box, axis=1)
-    apart = spheres.position[others] - spheres.position[one]
-    apart -= np.where(periodic, np.rint(apart / side) * side, 0.0)
-    distance = np.linalg.norm(apart, axis=1)
-    near = (distance < spheres.radius[others] + spheres.radius[one]) & (others != one)
-    places, squares = apart[near], spheres.radius[others[near]] ** 2
-    for points in np.split(_BALL, [_FIRST]):  # few points tell of nearly all that they stand out
-        points = (1 - _INSIDE_ROUNDING) * spheres.radius[one] * points
-        if np.any(np.all(cdist(points, places, "sqeuclidean") > squares, axis=1)):
-            return False
-    return True
-
-
-def _ball_points() -> Array:
-    """Points of the unit ball (2 `_SAMPLES`, 3), in mixed order, those on its surface first."""
-    turn = np.arange(_SAMPLES) * np.pi * (3 - 5**0.5)
-    height = 1 - (2 * np.arange(_SAMPLES) + 1) / _SAMPLES
-    wide = np.sqrt(1 - height**2)
-    surface = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), height])
-    mixed = np.random.default_rng(1).permutation(_SAMPLES)
-    depth = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES) ** (1 / 3)
-    return np.concatenate([surface[mixed], surface * depth[mixed, None]])
-
-
-_SAMPLES = 5_000
-_FIRST = 40
-_BALL = _ball_points()
 
 
 # ------------------------------------------------------------------------------------------------
@@ -364,14 +325,11 @@ def measure_porosity(
     Args:
         spheres: the spheres, m.
         periodic: (3,) sides across which spheres reach round; across the others they are clipped.
-        edges: (B+1,) edges of the bins along x, m; one bin, the box, without them.
+        edges: (B+1,) ascending edges of the bins along x within the box, m; one bin without them.
         lines: number of chords in each of the 8 lattices.
-
-    Raises:
-        CaseError: `edges` do not ascend within the box.
     """
     low, high = spheres.box.T
-    bins = _checked_edges(edges, float(low[0]), float(high[0]))
+    bins = np.array(spheres.box[0] if edges is None else edges, dtype=float)
     cuts = np.unique(np.concatenate([[low[0], high[0]], bins]))
     shifts = _spread_shifts(np.random.default_rng(SHIFT_SEED))
     filled = np.array(
@@ -392,22 +350,6 @@ def _without_rounding(value: Array) -> Array:
     """`value`, but 0 or 1 where it is beyond them by the rounding of the sums alone."""
     bounded = np.clip(value, 0.0, 1.0)
     return np.where(np.abs(value - bounded) < ROUNDING, bounded, value)
-
-
-def _checked_edges(edges: Array | None, low: float, high: float) -> Array:
-    bins = np.array([low, high]) if edges is None else np.asarray(edges, dtype=float)
-    tolerance = 1e-9 * (high - low)
-    if (
-        len(bins) < 2
-        or np.any(np.diff(bins) <= 0)
-        or bins[0] < low - tolerance
-        or bins[-1] > high + tolerance
-    ):
-        raise CaseError(
-            f"porosity bins: edges {bins.tolist()} do not ascend within the box "
-            f"[{low:g}, {high:g}] m; give ascending depths inside the box"
-        )
-    return np.clip(bins, low, high)
 
 
 def _spread_shifts(rng: np.random.Generator) -> Array:

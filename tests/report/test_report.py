@@ -1,7 +1,6 @@
 """The report: figures for every kind of specimen, and a page that says what the summary says."""
 
 import base64
-import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -13,12 +12,10 @@ from matplotlib.image import imread
 
 from fdnet.errors import CaseError
 from fdnet.report import figures
-from fdnet.report import vtk as view
 from fdnet.report.figures import cut_circles
 from fdnet.report.html import ReportParts, write_report
 from fdnet.report.tables import in_millidarcy
-from fdnet.report.text import facts, html_lines, summary_lines
-from fdnet.report.vtk import view_of
+from fdnet.report.text import facts, summary_lines
 from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
@@ -77,26 +74,6 @@ def test_nothing_is_taken_for_markup_or_fetched_from_outside(finished, tmp_path)
     assert sources == ["data:image/png;base64," + base64.b64encode(PNG).decode()]
 
 
-def test_the_view_holds_every_sphere_to_the_sixteenth_bit(finished, tmp_path, monkeypatch):
-    spheres = finished.spheres()
-    model = view_of(spheres)
-    table = np.frombuffer(base64.b64decode(model["data"]), "<u2").reshape(-1, 4) / 65535
-    low, high = np.array(model["low"]), np.array(model["high"])
-    both = [spheres.grains(), spheres.fines()]
-    position = np.concatenate([one.position for one in both]) * 1e3
-    assert model["grains"] == len(both[0])
-    assert np.abs(low + table[:, :3] * (high - low) - position).max() < 1e-4
-    radius = np.concatenate([one.radius for one in both]) * 1e3
-    assert table[:, 3] * model["radius"] == pytest.approx(radius, rel=1e-3)
-    reader, text = page_of(tmp_path, finished.summary, view=model)
-    scripts = [attributes for tag, attributes in reader.tags if tag == "script"]
-    assert len(scripts) == 2
-    assert not any("src" in attributes for attributes in scripts)
-    assert json.loads(text[text.index('{"grains"') : text.index("}", text.index('{"grains"')) + 1])
-    monkeypatch.setattr(view, "MOST_IN_VIEW", len(spheres) - 1)
-    assert view_of(spheres) is None, "too many are left to the picture"
-
-
 def test_a_summary_of_an_intact_pack_or_nothing_at_all_still_makes_a_page(finished, tmp_path):
     summary = finished.summary
     millidarcy = [in_millidarcy(summary[f"k_{state}_m2"]) for state in ("initial", "damaged")]
@@ -112,14 +89,14 @@ def test_a_summary_of_an_intact_pack_or_nothing_at_all_still_makes_a_page(finish
     assert " -> ".join(millidarcy) + " mD" in first.text
 
 
-def test_text_page_and_notebook_say_the_same_numbers_and_words(finished, tmp_path):
+def test_text_and_page_say_the_same_numbers_and_words(finished, tmp_path):
     """The last section lost -0.04 %, which no reader shall see as -0.0."""
     summary = finished.summary
     last = summary["sections"][-1] | {"k_reduction": -0.0004}
     well = {"skin": 0.056, "skin_flow_lost": 0.008, "skin_well_radius_m": 0.108}
     said = summary | well | {"sections": [*summary["sections"][:-1], last]}
     _, page = page_of(tmp_path, said)
-    text, book = "\n".join(summary_lines(said)), "".join(html_lines(tmp_path, said))
+    text = "\n".join(summary_lines(said))
     words = re.sub(r"\s+", " ", text)
     numbers = (
         summary["answer"],
@@ -131,12 +108,11 @@ def test_text_page_and_notebook_say_the_same_numbers_and_words(finished, tmp_pat
     for part in numbers:
         assert part in words, part
         assert part in page, part
-        assert part in book, part
     first = f"{100 * summary['sections'][0]['k_reduction']:.1f}"
     for part in ("0.8 % of the flow of a well of 108 mm", first):
         assert part in words, part
         assert part in page, part
-    assert not re.search(r"-0\.0\b", page + words + book)
+    assert not re.search(r"-0\.0\b", page + words)
 
 
 def test_a_missing_figure_is_named(finished, tmp_path):

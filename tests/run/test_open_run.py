@@ -198,11 +198,8 @@ def test_damaged_records_and_tables_are_refused_with_what_to_do(run, tmp_path):
         ("summary.json", lambda text: "{", summary, "cannot be read as JSON"),
     ]
     for table, change, message in (
-        ("throats", lambda text: text[: len(text) // 2], "rows, expected|cannot be read|number"),
-        ("sections", lambda text: "", "cannot be read as a table"),
-        ("pores", lambda text: text.replace("0.", "zero", 1), "no number"),
-        ("profile", lambda text: text.replace("x_lo_m", "x_lo"), "no column x_lo_m"),
-        ("sections", lambda text: text + text.splitlines()[-1] + "\n", "4 rows, expected 3"),
+        ("throats", lambda text: text[: len(text) // 2], ANEW),
+        ("profile", lambda text: text.replace("x_lo_m", "x_lo"), ANEW),
         ("sections", one_digit, ANEW),
         ("profile", one_digit, ANEW),
         ("pores", one_digit, ANEW),

@@ -41,7 +41,7 @@ Solve = Callable[[Array, float], Array]
 class Balances:
     """The system sum_j g_ij (p_i - p_j) + tied_i p_i = source_i, kept for many sources.
 
-    Up to 3,000 nodes (`direct_up_to`) it is solved directly. Larger systems are solved by
+    Up to 3,000 nodes it is solved directly. Larger systems are solved by
     conjugate gradients with Ruge-Stuben multigrid (Ruge and Stuben 1987; second pass, strength
     0.5). Multigrid works on the system as it stands, whose near-kernel is the constant that the
     interpolation assumes; scaled to a unit diagonal it needs several times the steps. Where it
@@ -52,15 +52,12 @@ class Balances:
         pair: (K, 2) nodes that the links join.
         conductance: (K,) above 0.
         tied: (n,) conductance to nodes of pressure 0.
-        direct_up_to: number of nodes up to which the direct solver is used; None for 3,000.
     """
 
-    def __init__(
-        self, pair: Array, conductance: Array, tied: Array, *, direct_up_to: int | None = None
-    ) -> None:
+    def __init__(self, pair: Array, conductance: Array, tied: Array) -> None:
         self._unit = float(np.median(conductance)) if len(conductance) else 1.0
         self._matrix = laplacian(pair, conductance / self._unit, tied / self._unit)
-        self._direct = len(tied) <= (DIRECT_UP_TO if direct_up_to is None else direct_up_to)
+        self._direct = len(tied) <= DIRECT_UP_TO
         self._solve: Solve | None = None
 
     @property
@@ -464,9 +461,7 @@ class _Stage(NamedTuple):
     balances: Balances
 
 
-def balance_links(
-    ends: Array, conductance: Array, jump: Array, count: int, *, direct_up_to: int | None = None
-) -> Balance:
+def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> Balance:
     """Balance of all nodes, every one of which must be in a group that winds.
 
     The levels of stiffness differ by a contrast of 1e8. Where links of like conductance fall on
@@ -478,25 +473,17 @@ def balance_links(
         conductance: (K,) above 0.
         jump: (K,) of the links.
         count: number of nodes.
-        direct_up_to: number of nodes up to which a direct solver is used, see `Balances`.
     """
     tried = []
     for contrast in CONTRASTS:
         level = stiffness(ends, conductance, jump, count, contrast=contrast)
-        tried.append(_balance(ends, conductance, jump, level, count, direct_up_to))
+        tried.append(_balance(ends, conductance, jump, level, count))
         if tried[-1].defect <= SETTLED or not level.any():
             break
     return min(tried, key=lambda one: one.defect)
 
 
-def _balance(
-    ends: Array,
-    conductance: Array,
-    jump: Array,
-    level: Array,
-    count: int,
-    direct_up_to: int | None,
-) -> Balance:
+def _balance(ends: Array, conductance: Array, jump: Array, level: Array, count: int) -> Balance:
     """Balance level by level, with the `level` (K,) of each link, repeated for what is left over.
 
     Left over are the imbalances, and the pressure differences within the contracted groups, which
@@ -512,8 +499,7 @@ def _balance(
         label = groups(ends[level > at], count)
         level[(level == at) & (label[ends[:, 0]] == label[ends[:, 1]])] = at + 1
     stages = [
-        _stage(ends, conductance, level, at, count, direct_up_to)
-        for at in range(int(level.max(initial=0)) + 1)
+        _stage(ends, conductance, level, at, count) for at in range(int(level.max(initial=0)) + 1)
     ]
     flux, defect, allowed = np.zeros(len(ends)), np.inf, None
     for _ in range(MOST_SWEEPS):
@@ -560,9 +546,7 @@ def stiffness(
     return np.maximum(np.ceil(np.log(ratio) / np.log(contrast)).astype(int) - 1, 0)
 
 
-def _stage(
-    ends: Array, conductance: Array, level: Array, at: int, count: int, direct_up_to: int | None
-) -> _Stage:
+def _stage(ends: Array, conductance: Array, level: Array, at: int, count: int) -> _Stage:
     """The stage of the links of level `at`."""
     links, label = np.flatnonzero(level == at), groups(ends[level > at], count)
     pair, size = label[ends[links]], int(label.max(initial=-1)) + 1
@@ -575,7 +559,7 @@ def _stage(
         held = free[pair[:, side]] & ~free[pair[:, 1 - side]]
         tied += np.bincount(index[pair[held, side]], weights=own[held], minlength=len(tied))
     inner = np.all(free[pair], axis=1)
-    balances = Balances(index[pair[inner]], own[inner], tied, direct_up_to=direct_up_to)
+    balances = Balances(index[pair[inner]], own[inner], tied)
     return _Stage(links=links, label=label, free=free, balances=balances)
 
 
