@@ -372,8 +372,9 @@ class Run(Part):
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] | None = None
     """Time step over sqrt(m/k) of the lightest sphere and stiffest contact. Up to 0.3 is stable
     for linear contacts without rolling friction and with damping ratios up to 0.48; all others
-    take at most 0.2. When absent: 0.2; the largest that is stable where springs grow with the
-    load (stiffness "auto", field "network")."""
+    take at most 0.2. When absent: 0.2; where springs grow with the load (stiffness "auto", field
+    "network") the largest that is stable, or less, down to 0.1, so that small fines do not lock
+    between grains."""
     time_step_s: Positive | None = None
     """Time step of the invasion, instead of `time_step_factor`."""
     duration_ms: Positive | None = None

@@ -4,10 +4,17 @@ import math
 from dataclasses import dataclass
 from typing import TypeVar
 
-from fdnet.case.case import Case, InvasionCase
+from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS, MOST_SLAB
 from fdnet.errors import CaseError, Doubt
-from fdnet.scales.contacts import Contact, contacts_of, overlaps_of, two_digits_up
+from fdnet.scales.contacts import (
+    MOST_FALSE_FORCE,
+    Contact,
+    contacts_of,
+    overlaps_of,
+    sticking_of,
+    two_digits_up,
+)
 from fdnet.scales.drag import BRIDGING, Crowd, crowd_drag_factor, push_of, throat_width
 from fdnet.scales.flow import (
     Drive,
@@ -220,6 +227,8 @@ be as large as the scatter between seeds."""
 DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
 """Time for which drag is constant over tau: above the first value fdnet warns, above the second it
 refuses the case."""
+LEAST_FACTOR = 0.1
+"""Least time step over sqrt(m/k) that is taken so that small fines do not lock between grains."""
 SAFE_FACTOR = 0.2
 """Time step over sqrt(m/k) that is accepted with any contact."""
 RANDOM_CLOSE = 0.36
@@ -462,4 +471,21 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
         (deep.impact / PRESSED) ** struck,
     )
     number = two_digits_up(raised * DEFAULT_STIFFNESS)
-    return stiff(number, time_step_factor=factor) if start and rises(case) else stiff(number)
+    if not start or not rises(case):
+        return stiff(number)
+    if case.run.time_step_factor is None:
+        factor = _unlocked(with_fines(stiff(number)), flow, factor)
+    return stiff(number, time_step_factor=factor)
+
+
+def _unlocked(case: InvasionCase, flow: Velocity, factor: float) -> float:
+    """The largest time step over sqrt(m/k), up to `factor`, at which no fine locks by it.
+
+    At least `LEAST_FACTOR`.
+    """
+    contacts, drive = contacts_of(case, flow.interstitial), drive_in(case, flow)
+    push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
+    locks = sticking_of(case, contacts["grain-fine"], push, factor * contact_step(case, contacts))
+    if not locks.by_integrator:
+        return factor
+    return max(LEAST_FACTOR, factor * MOST_FALSE_FORCE / locks.false_force)
