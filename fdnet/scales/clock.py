@@ -7,7 +7,7 @@ from typing import TypeVar
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS, MOST_SLAB
 from fdnet.errors import CaseError, Doubt
-from fdnet.scales.contacts import Contact, contacts_of, overlaps_of, two_digits_up
+from fdnet.scales.contacts import SAFE_FACTOR, Contact, contacts_of, overlaps_of, two_digits_up
 from fdnet.scales.drag import BRIDGING, Crowd, crowd_drag_factor, push_of, throat_width
 from fdnet.scales.flow import (
     Drive,
@@ -220,8 +220,6 @@ be as large as the scatter between seeds."""
 DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
 """Time for which drag is constant over tau: above the first value fdnet warns, above the second it
 refuses the case."""
-SAFE_FACTOR = 0.2
-"""Time step over sqrt(m/k) that is accepted with any contact."""
 RANDOM_CLOSE = 0.36
 """Porosity of random close packing of equal spheres (Scott and Kilgour 1969)."""
 _ROUNDING = 1 + 1e-12
@@ -445,7 +443,9 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
         run = case.run.model_copy(update={"stiffness_N_m": value, **more})
         return case.model_copy(update={"run": run})
 
-    soft = stiff(DEFAULT_STIFFNESS)
+    own = case.run.time_step_factor
+    longest = own or (CONTACT_STEP_LIMIT if start and rises(case) else SAFE_FACTOR)
+    soft = stiff(DEFAULT_STIFFNESS, time_step_factor=longest)
     if not isinstance(soft, InvasionCase):
         return soft
     porosity = target_porosity(soft)
