@@ -16,6 +16,8 @@ AUTO: DamageLawName = "auto"
 """The damage law of the default: the most accurate that its cost allows."""
 ALL_SPHERES: DamageLawName = "all-spheres"
 """The damage law that "auto" takes for up to `MOST_SPHERES` spheres; it needs `DEFAULT_LAW`."""
+FLOW_LAW = "by section-archie with the standing fines"
+"""The law of the permeability that a flow that follows its deposit meets."""
 SECTION_ARCHIE: DamageLawName = "section-archie"
 """The damage law that "auto" takes for more of them, and with other conductance laws."""
 MOST_SPHERES = 300_000

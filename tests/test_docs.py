@@ -14,7 +14,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "docs" / "_ext"))
 
-import check_links  # noqa: E402
 import import_graph  # noqa: E402
 import reference_tables  # noqa: E402
 from case_keys import meaning_of, part_model  # noqa: E402
@@ -29,7 +28,7 @@ NOW_AND_THEN = {
     *("k_moved_m2", "sizes", "skin", "skin_flow_lost", "skin_well_radius_m", "drag_updates"),
     *("drag_last_update", "rate_over_initial", "filtrate_m3", "cake_resistance_share"),
     *("momentum_defect_most", "spurt_m3_m2", "volume_30min_m3_m2", "filtrate_fit"),
-    *("cake_by_depth", "return_k_over_k0", "k_returned_m2", "clean_up"),
+    *("return_k_over_k0", "k_returned_m2", "clean_up"),
     *("cpu_seconds", "peak_memory_bytes"),
 }
 """Keys of summary.json that a tiny run does not have."""
@@ -215,15 +214,6 @@ def test_every_key_command_and_name_is_explained():
 def test_the_citation_has_the_version_of_the_package():
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
-
-
-def test_broken_links_of_a_site_are_named(tmp_path):
-    (tmp_path / "a.html").write_text('<p id="here"></p><a href="b.html#there">b</a>')
-    (tmp_path / "b.html").write_text('<a href="a.html#here">a</a><img src="gone.png">')
-    assert [one.split(": ")[1] for one in sorted(check_links.broken_links(tmp_path))] == [
-        "b.html#there",
-        "gone.png",
-    ]
 
 
 def explained(heading: str, *, table: int = 0) -> list[str]:

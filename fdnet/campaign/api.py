@@ -48,6 +48,12 @@ def ensemble(
     Raises:
         CaseError: the case, the folder or an option cannot be used.
         LiggghtsError: LIGGGHTS is missing. A run that fails is named in `summary["failures"]`.
+
+    Examples:
+        >>> import fdnet
+        >>> fdnet.ensemble("cases/quick.toml", seeds=0, out="runs/none")
+        Traceback (most recent call last):
+        fdnet.errors.CaseError: seeds: 0, expected 1 or more, ...
     """
     given = case if isinstance(case, Case) else read_case(case)
     return _carried_out(partial(plans.ensemble_plan, given, seeds), out, until, max_seeds, **how)
@@ -64,6 +70,12 @@ def sweep(
     """Run every combination of the sweep file at `path`, and compare the variants.
 
     The other arguments, results (in SI: m, m2) and errors are those of `ensemble`.
+
+    Examples:
+        >>> import fdnet
+        >>> fdnet.sweep("no-such-sweep.toml", out="runs/none")
+        Traceback (most recent call last):
+        fdnet.errors.CaseError: no-such-sweep.toml: cannot be read as a sweep file: ...
     """
     return _carried_out(partial(plans.sweep_plan, path), out, until, max_seeds, **how)
 
@@ -76,6 +88,12 @@ def compare_runs(
     The folder of a campaign stands for all its finished runs; where `out` is this folder, its
     own results are written anew. Lengths are in m and permeabilities in m2. Raises CaseError for
     a folder without a finished run, and for a run that would be counted twice.
+
+    Examples:
+        >>> import fdnet
+        >>> fdnet.compare_runs(["no/such/run"], out="runs/compared")
+        Traceback (most recent call last):
+        fdnet.errors.CaseError: no/such/run: does not exist; ...
     """
     return write_comparison(gathered([expanded(run) for run in runs], expanded(out), ranked_by))
 
@@ -141,10 +159,8 @@ def parse_until(text: str) -> Until:
     """
     match = _UNTIL.fullmatch(text)
     if match is None or not 0 < (width := float(match[2])) < float("inf"):
-        raise CaseError(
-            f"--until {text!r}: expected a quantity and the half of its band, e.g. "
-            "'k_reduction ± 5 %' or 'k_damaged_m2 +- 10 %'"
-        )
+        wanted = "a quantity and the half of its band, e.g. 'k_reduction ± 5 %'"
+        raise CaseError(f"--until {text!r}: expected {wanted} or 'k_damaged_m2 +- 10 %'")
     percent = match[3] == "%"
     relative = percent and results.SHARES.search(match[1]) is None
     return Until(match[1], width / 100 if percent else width, relative)

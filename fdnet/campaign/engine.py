@@ -93,10 +93,8 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
         return
     plugin = "snakemake_executor_plugin_slurm" if how.engine == "slurm" else "snakemake"
     if how.engine != "local" and not (has_snakemake() and find_spec(plugin)):
-        raise CaseError(
-            f"--engine {how.engine}: {plugin} is not installed; pip install 'fdnet[sweep]', or "
-            "take --engine local"
-        )
+        advice = "pip install 'fdnet[sweep]', or take --engine local"
+        raise CaseError(f"--engine {how.engine}: {plugin} is not installed; {advice}")
     missing = sum(task.makes.endswith(MANIFEST) for task in tasks)
     how.say(f"{len(plan.jobs)} runs, {missing} of them to do")
     for task in tasks:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata, resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
@@ -21,22 +21,16 @@ from fdnet.report.tables import MILLIDARCY, read_table
 from fdnet.statistics.bands import Band, seeds_for_width
 from fdnet.statistics.differences import MOST_SEEDS
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 SHOWN = ("k_reduction", "k_damaged_m2", "invasion_depth_p95_m", "invaded_count", "passed_count")
 """Quantities of the tables of the page, after the ranked one."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Compared:
-    """Runs and what they say together. It prints its ranking.
+    """Runs and what they say together, a sentence for each variant and each two; it prints them.
 
-    Attributes:
-        path: folder with table.csv, summary.json and compare.html.
-        summary: what summary.json holds: `runs`, `failed`, and by quantity `mean`, `low`, `high`.
-        ranking: one sentence for each variant; those of a design stand first.
-        differences: one sentence for each two variants.
+    In the folder `path` are table.csv, summary.json and compare.html. The summary has `runs`,
+    `failed`, and by quantity `mean`, `low` and `high`.
     """
 
     path: Path
@@ -45,8 +39,8 @@ class Compared:
     differences: tuple[str, ...]
 
     @property
-    def table(self) -> "pd.DataFrame":
-        """table.csv: one row for each run, lengths in m and permeabilities in m2."""
+    def table(self) -> Any:
+        """table.csv by pandas: a row for each run, lengths in m and permeabilities in m2."""
         columns = ("run", "variant", "seed", "status")
         return read_table(self.path / results.TABLE, columns, texts=None)
 
@@ -67,9 +61,8 @@ def write_comparison(
     design = [{"name": mud.name, "state": mud.state} for mud in muds]
     more = {"design": design, "targets": limits} if limits else {}
     summary = results.write_summary(comparison, more)
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    trim: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True}
+    environment = Environment(autoescape=True, undefined=StrictUndefined, **trim)
     shown = dict.fromkeys([comparison.ranked_by, *SHOWN])
 
     def link(run: results.Entry) -> str:
@@ -85,7 +78,7 @@ def write_comparison(
         ranking=[re.sub(r"^\d+\. ", "", line) for line in ranking],
         pairs=pairs,
         figures=[*filter(None, (_draw_ranking(comparison), _draw_depth(comparison)))],
-        label=label,
+        label=lambda quantity: LABELS.get(quantity, quantity),
         value_text=value_text,
         band_text=band_text,
         link=link,
@@ -108,11 +101,6 @@ LABELS = {
     "porosity_damaged": "damaged porosity",
 }
 """Quantities of a summary in words."""
-
-
-def label(quantity: str) -> str:
-    """A quantity in words."""
-    return LABELS.get(quantity, quantity)
 
 
 def unit_of(quantity: str) -> tuple[float, str]:
@@ -156,7 +144,7 @@ def ranking_lines(comparison: Comparison) -> list[str]:
         place = f"{number}. {name}" if len(names) > 1 else name
         count = len(comparison.values(name, quantity))
         band = band_text(quantity, comparison.band(name, quantity))
-        told = f"{label(quantity)} {band}, {count} seed{'s' if count > 1 else ''}"
+        told = f"{LABELS.get(quantity, quantity)} {band}, {count} seed{'s' if count > 1 else ''}"
         lines.append(f"{place}: {told if count else 'no finished run'}.")
     return lines
 
@@ -204,7 +192,7 @@ def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[Cand
             state = 0 if band.high <= limit else 2 if band.low > limit else 1
             worst = max(worst, state)
             over = max(over, band.mean / limit if limit else math.inf)
-            reason = f"{label(quantity)} {band_text(quantity, band)}, at most "
+            reason = f"{LABELS.get(quantity, quantity)} {band_text(quantity, band)}, at most "
             reason += f"{value_text(quantity, limit)}: {states[state]}"
             if state == 1 and len(values) > 1 and (gap := abs(band.mean - limit)) > 0:
                 needed = seeds_for_width(values, gap, MOST_SEEDS)
@@ -234,16 +222,15 @@ def _draw_ranking(comparison: Comparison) -> dict[str, str] | None:
         values = factor * np.array(list(comparison.values(name, quantity).values()))
         band = comparison.band(name, quantity)
         axes.plot(values, np.full(len(values), place), "o", ms=4, color="0.6", zorder=2)
-        ends = [factor * band.low, factor * band.high]
-        axes.plot(ends, [place, place], color=COLOURS[0], lw=5, alpha=0.4, solid_capstyle="butt")
+        ends = (factor * band.low, factor * band.high)
+        axes.hlines(place, *ends, color=COLOURS[0], lw=5, alpha=0.4)
         axes.plot(factor * band.mean, place, "|", ms=16, mew=2.5, color=COLOURS[0], zorder=3)
     axes.set_yticks(range(len(names)), [_short(name) for name in names])
     axes.invert_yaxis()
     axes.margins(y=0.25 / len(names) + 0.05)
     axes.set_xlabel(_with_unit(quantity))
-    order = ", best first" if len(names) > 1 else ""
-    caption = f"Every run (grey), mean over the seeds (line) and its 95 % band (blue){order}."
-    return _svg(figure, caption)
+    caption = "Every run (grey), mean over the seeds (line) and its 95 % band (blue)"
+    return _svg(figure, f"{caption}{', best first' if len(names) > 1 else ''}.")
 
 
 def _draw_depth(comparison: Comparison) -> dict[str, str] | None:
@@ -304,4 +291,4 @@ def _short(name: str) -> str:
 
 def _with_unit(quantity: str) -> str:
     unit = unit_of(quantity)[1]
-    return f"{label(quantity)} ({unit})" if unit else label(quantity)
+    return f"{LABELS.get(quantity, quantity)} ({unit})" if unit else LABELS.get(quantity, quantity)

@@ -312,10 +312,7 @@ def write_table(comparison: Comparison) -> None:
 
 
 def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Write summary.json, with `more` keys; returns its mapping.
-
-    Each quantity has its mean over seeds and variants; `variants` has that of each.
-    """
+    """Write summary.json, with `more` keys: means over seeds and variants, and of each variant."""
     failures = [
         {"run": one.name, "status": one.status, "reason": one.reason}
         | {"folder": os.path.relpath(one.folder, comparison.path)}

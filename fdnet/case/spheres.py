@@ -419,7 +419,7 @@ class Fines(Spheres):
     """Mass of solids in a volume of mud, instead of `concentration`."""
     count: Annotated[int, Field(ge=1)] | None = None
     """Number of fines supplied. When absent, and `slab_mm` too, mud comes until the stop rule, but
-    at most ten times what plugged the shipped cases, or five pore volumes of fines that pass."""
+    at most ten times what plugged the shipped cases, or two pore volumes of fines that pass."""
     slab_mm: Positive | None = None
     """Length of the slab of mud, instead of `count`."""
     supply: Literal["slab", "batches"] = "batches"

@@ -381,7 +381,7 @@ class Run(Part):
     plug_time_ms: Positive | None = None
     """The face counts as plugged when no fine crossed it for this time. When absent: until the
     fluid has passed four grain diameters and ten fines have arrived."""
-    plug_rate: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    plug_rate: Annotated[float, Field(ge=0, lt=1)] = 0.05
     """Share of the undisturbed supply that may still cross the face while it counts as plugged."""
     stop_rate: Fraction | None = None
     """Share of the first rate below which the invasion ends as plugged (field "network")."""

@@ -1,7 +1,6 @@
 """`fdnet permeability`: the permeability of spheres in a file, without LIGGGHTS."""
 
 import argparse
-import math
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -170,20 +169,15 @@ def directions_of(text: str) -> tuple[bool, bool, bool]:
 
 
 def box_of(text: str) -> list[float]:
+    from fdnet.spheres.snapshot import checked_box
+
     try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if (
-        len(values) != 6
-        or not all(map(math.isfinite, values))
-        or any(values[i] >= values[i + 1] for i in (0, 2, 4))
-    ):
+        return checked_box([float(part) for part in text.split(",")]).ravel().tolist()
+    except (CaseError, ValueError) as error:
         raise CaseError(
             f"--box: {text!r}, expected six numbers x0,x1,y0,y1,z0,z1 with each lower bound below "
             "the upper"
-        )
-    return values
+        ) from error
 
 
 def types_of(text: str) -> dict[int, str]:

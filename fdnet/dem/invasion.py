@@ -315,7 +315,7 @@ class EndedStage:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Invasion(EndedStage):
-    """A finished invasion; `stop_reason` is also "plugged", "supply_exhausted" or "mud_cut_off".
+    """A finished invasion; `stop_reason` is also "plugged", "supply_exhausted", "mud_cut_off".
 
     Attributes:
         supplied: number of fines that took part: all, or those of the batches that had come.

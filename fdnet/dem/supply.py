@@ -237,7 +237,7 @@ def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
     """The batches of a case: of equal length, with the slab's fines shared out evenly.
 
     A slab that is fed at once is one batch, and so is one of so few fines that some batch would be
-    empty. Mud without an end has longer batches then. No batch is thinner than a fine, so that
+    empty; mud without an end has longer batches then. No batch is thinner than a fine, so that
     each must clear only the one next to it.
     """
     travel = scales.upstream_velocity * scales.checkpoint_steps * scales.time_step

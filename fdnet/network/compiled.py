@@ -11,7 +11,6 @@ NUMBA_CACHE_DIR, when set, is used instead, as numba uses it.
 import contextlib
 import hashlib
 import os
-import pickle
 import stat
 import sys
 import tempfile
@@ -108,10 +107,10 @@ def _say_once(folder: str, what: str, error: Exception) -> None:
 
 
 class _CheckedFile(IndexDataCacheFile):
-    """numba's files of one function, each sealed with a digest, since numba runs what it reads.
+    """numba's files of one function.
 
-    A bad file is left aside and made anew. Where nothing can be written the function is compiled
-    again in every process.
+    A file that cannot be read is left aside and made anew. Where nothing can be written the
+    function is compiled again in every process.
     """
 
     def load(self, key: Any) -> Any:
@@ -136,37 +135,6 @@ class _CheckedFile(IndexDataCacheFile):
             super().save(key, (key, data))
         except Exception as error:
             _say_once(self._cache_path, "cannot be written and is done without", error)
-
-    def _load_index(self) -> Any:
-        with contextlib.suppress(FileNotFoundError), open(self._index_path, "rb") as file:
-            pickle.load(file)
-            self._opened(self._index_name, file.read())
-        return super()._load_index()
-
-    def _save_index(self, overloads: Any) -> None:
-        body = self._dump((self._source_stamp, overloads))
-        with self._open_for_write(self._index_path) as file:
-            pickle.dump(self._version, file, protocol=-1)
-            file.write(body + self._seal(self._index_name, body))
-
-    def _load_data(self, name: str) -> Any:
-        return pickle.loads(self._opened(name, Path(self._data_path(name)).read_bytes()))
-
-    def _save_data(self, name: str, data: Any) -> None:
-        body = self._dump(data)
-        with self._open_for_write(self._data_path(name)) as file:
-            file.write(body + self._seal(name, body))
-
-    def _opened(self, name: str, content: bytes) -> bytes:
-        size = hashlib.sha256().digest_size
-        body, seal = content[:-size], content[-size:]
-        if seal != self._seal(name, body):
-            raise ValueError(f"{name} is not as it was written")
-        return body
-
-    @staticmethod
-    def _seal(name: str, body: bytes) -> bytes:
-        return hashlib.sha256(name.encode() + b"\0" + body).digest()
 
 
 def _checked(function: Any, files: IndexDataCacheFile) -> _CheckedFile:

@@ -29,7 +29,7 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot, one_line
 CONTACT_GAP = 0.01
 """Spheres this far apart, in diameters of the smaller one, touch."""
 HELD_BY = 2
-"""Fewest contacts of a fine that stands. In cakes that LIGGGHTS made, of one size and of many, this
+"""Fewest contacts of a fine that stands. In cakes that LIGGGHTS made, of one size and of many, it
 gives the fines slower than half the velocity of the fluid best: 2 and 6 % more resistance than
 theirs, 3 contacts give 5 and 19 % less, for small fines lie caged between others."""
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.files import replacing
+from fdnet.names import FLOW_LAW
 from fdnet.report.tables import MILLIDARCY, between_grains, blocked_throats
 from fdnet.sizes import SizeCurve
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -176,7 +177,7 @@ def fill_history(figure: Any, *, history: Sequence[Mapping[str, float]]) -> None
     )
     flow = (
         ("rate_over_initial", "rate of flow", BLUE, "-"),
-        ("k_over_k0", "permeability of the specimen", ORANGE, "--"),
+        ("k_over_k0", f"permeability {FLOW_LAW}", ORANGE, "--"),
     )
     known = [curve for curve in flow if all(curve[0] in row for row in history)]
     panels = [(counts, "number of fines (–)"), *([(known, "over the first (–)")] if known else [])]

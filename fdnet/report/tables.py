@@ -17,7 +17,6 @@ from fdnet.errors import CaseError, Doubt
 from fdnet.files import replacing, write_text
 from fdnet.network.flow.flow import INLET, OUTLET, open_links
 from fdnet.network.network import Network
-from fdnet.spheres.dump import exact_numbers
 from fdnet.spheres.snapshot import Array
 
 if TYPE_CHECKING:
@@ -445,7 +444,7 @@ def read_table(
         problem = "is no ordinary file" if path.exists() else "is missing"
         raise CaseError(f"{path}: {problem}; {_again(path)}")
     try:
-        table = pd.read_csv(path, **exact_numbers())
+        table = pd.read_csv(path, **_exact_numbers())
     except (OSError, ValueError) as error:
         why = f"cannot be read as a table ({str(error).strip()})"
         raise CaseError(f"{path}: {why}; {_again(path)}") from error
@@ -465,6 +464,13 @@ def read_table(
     if problem:
         raise CaseError(f"{path}: {problem}; {_again(path)}")
     return table
+
+
+def _exact_numbers() -> dict[str, Any]:
+    """The option with which pandas reads every digit; from pandas 3 on that is the default."""
+    import pandas as pd
+
+    return {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 
 
 def empty_table(columns: Sequence[str]) -> "pd.DataFrame":

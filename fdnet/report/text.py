@@ -14,7 +14,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.case.tables import Run
 from fdnet.errors import SHOWN, Doubt
-from fdnet.names import STAGES
+from fdnet.names import FLOW_LAW, STAGES
 from fdnet.report.tables import (
     AGREES,
     MILLIDARCY,
@@ -175,6 +175,8 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
     if not damage["zone_depth_m"]:
         return f"{p95}, and no layer loses {limit} of its permeability: the damage is negligible."
     share = f"{two_digits(damage['zone_k_over_k0'])} of the permeability"
+    if followed(summary) is not None:
+        share += f" (by the law {_law_of(summary)})"
     if damage["reaches_the_end"]:
         return (
             f"{p95}, and the damage reaches the end of the specimen, which keeps {share}: "
@@ -246,15 +248,29 @@ class Fact(NamedTuple):
         return self.value.rstrip(":,")
 
 
+def followed(summary: Mapping[str, Any]) -> float | None:
+    """k over k0 at the last update of a flow that followed the deposit; None without one."""
+    return (summary.get("drag_last_update") or {}).get("k_over_k0")
+
+
+def _law_of(summary: Mapping[str, Any]) -> str:
+    return str(summary.get("damage_law_used") or summary.get("damage_law"))
+
+
 def facts(summary: Mapping[str, Any]) -> Iterator[Fact]:
-    """The headline numbers of a run."""
+    """The headline numbers of a run.
+
+    Where the flow followed the deposit there are two laws of its damage, and each number names
+    its own.
+    """
     before, after = summary["k_initial_m2"], summary["k_damaged_m2"]
-    damaged = summary["supplied_count"] or summary["invaded_count"]
+    damaged, flow = summary["supplied_count"] or summary["invaded_count"], followed(summary)
     if damaged:
         yield Fact(
             "permeability",
             f"{in_millidarcy(before)} -> {in_millidarcy(after)} mD",
-            f"({before:.3g} -> {after:.3g} m2), {percent(summary['k_reduction'])} % lost",
+            f"({before:.3g} -> {after:.3g} m2), {percent(summary['k_reduction'])} % lost"
+            + ("" if flow is None else f" by the law {_law_of(summary)}"),
         )
     else:
         yield Fact("permeability", f"{in_millidarcy(before)} mD", f"({before:.3g} m2)")
@@ -264,6 +280,12 @@ def facts(summary: Mapping[str, Any]) -> Iterator[Fact]:
         yield Fact(
             "other law", f"{in_millidarcy(other)} mD", f"({other:.3g} m2) with fines by {law}"
         )
+    if flow is not None:
+        yield Fact(
+            "flow",
+            f"{percent(1 - flow)} % lost",
+            f"as the flow met it last: {FLOW_LAW} (k_over_k0 of history.csv)",
+        )
     porosity = f"{summary['porosity_initial']:.4f}"
     yield Fact(
         "porosity", f"{porosity} -> {summary['porosity_damaged']:.4f}" if damaged else porosity
@@ -272,7 +294,7 @@ def facts(summary: Mapping[str, Any]) -> Iterator[Fact]:
         yield from _facts_of_fines(summary)
     else:
         yield Fact("fines", "none supplied")
-    used = summary.get("damage_law_used") or summary["damage_law"]
+    used = _law_of(summary)
     yield Fact("laws", f"{summary['law']} and {used} (damage);", f"seed {summary['seed']}")
 
 

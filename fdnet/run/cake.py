@@ -8,7 +8,7 @@ their sum. Each fine of a cake at rest resists the superficial velocity U by its
 
 by the law of Beetstra, van der Hoef and Kuipers (`fdnet.scales.drag`), with the porosity phi_i of
 the pack and the cake around it. The flow that follows the deposit takes the same sum. It is
-within 15 % of resolved flow (docs/physics_network.md, section 10).
+8 to 17 % above resolved flow (docs/physics_network.md, section 10).
 """
 
 import math

@@ -18,7 +18,6 @@ from fdnet.dem.checkpoint import Checkpoint, entered_by, time_of
 from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
-from fdnet.network.field.field import VelocityField
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
 from fdnet.run.cake import standing_cake
 from fdnet.run.network_flow import (
@@ -33,7 +32,7 @@ from fdnet.run.network_flow import (
 from fdnet.scales.drag import Crowd, crowd_drag_factor
 from fdnet.scales.flow import darcy_through, path_of
 from fdnet.scales.scales import InvasionScales
-from fdnet.spheres.snapshot import Array, Snapshot, unmoved
+from fdnet.spheres.snapshot import Array, Snapshot
 
 CROWD_COLUMNS = ("factor_mean", "factor_most", "porosity_least", "porosity_capped")
 """Mean and largest factor on the drag, least porosity, fines whose porosity was capped."""
@@ -105,30 +104,6 @@ def mirrored(spheres: Snapshot) -> Snapshot:
 
 PARTS = 4
 """Parts of the way; in each the fluid is taken half-way."""
-
-
-class IntactFlow:
-    """The intact pack's flow at the fines, taken again only where they moved.
-
-    Attributes:
-        velocity: (N, 3) over the superficial velocity.
-        gradient: (N, 3) 1/m2, of the pressure over mu U.
-    """
-
-    def __init__(self) -> None:
-        none = np.zeros((0, 3))
-        self._at, self.velocity, self.gradient = (np.zeros(0, int), none), none, none
-
-    def take(self, fines: Snapshot, shape: VelocityField) -> None:
-        """Take the flow `shape` of the intact pack at N `fines`."""
-        new, old = unmoved((fines.id, fines.position), self._at)
-        moved = np.ones(len(fines), bool)
-        moved[new] = False
-        velocity, gradient = (np.empty((len(fines), 3)) for _ in range(2))
-        velocity[new], velocity[moved] = self.velocity[old], shape.at(fines.position[moved])
-        gradient[new] = self.gradient[old]
-        gradient[moved] = shape.pressure_gradient_at(fines.position[moved])
-        self._at, self.velocity, self.gradient = (fines.id, fines.position), velocity, gradient
 
 
 class Movers(NamedTuple):
@@ -285,10 +260,6 @@ class NetworkFluid:
         return Renewal(self.pack, renewed=self.renewed)
 
     @cached_property
-    def _intact(self) -> IntactFlow:
-        return IntactFlow()
-
-    @cached_property
     def first_velocity(self) -> float:
         """Superficial velocity at the start, m/s as simulated.
 
@@ -318,17 +289,16 @@ class NetworkFluid:
         fines, pack, scales = spheres.fines(), self.pack, self.scales
         depth, lone = fines.position[:, 0], scales.push.coefficient * fines.radius
         within = (depth >= 0) & (depth < pack.length)
-        measured, intact = placed(fines), self._intact
-        intact.take(measured, pack.shape)
-        before = self._before(moment)
+        measured, before = placed(fines), self._before(moment)
+        intact = pack.shape.at(measured.position)
         # a fine that comes out of a throat has the speed that it was given, slow for its place
-        usual = before * _speed(intact.velocity)
+        usual = before * _speed(intact)
         known = usual if moment.given is None else np.where(moment.given > 0, moment.given, usual)
         standing = _speed(fines.velocity) < self.standing * known
         carried, deposit = self.renewal.of(measured.where(standing), anew=moment.fresh)
         near = local_porosity(spheres, self.case.periodic)
         share = pack.share_at(fines.position, carried)
-        shape = intact.velocity * share[:, None]
+        shape = intact * share[:, None]
         slip = _speed(before * shape - fines.velocity)
         factor = crowd_factor(scales, near, fines.radius, slip)
         crowd, goes = lone * factor, ~standing
@@ -355,7 +325,7 @@ class NetworkFluid:
         drop = self._viscosity * speed * pack.length / pack.permeability / carried.k_over_k0
 
         pressed, fluid = drop * pressed, speed * shape
-        pace = np.maximum(_speed(speed * intact.velocity), speed)
+        pace = np.maximum(_speed(speed * intact), speed)
         force, volume = _speed(pressed), 4.0 / 3.0 * np.pi * fines.radius**3
         going = np.divide(force, pace, out=np.zeros_like(force), where=pace > 0)
         coefficient = np.where(held, np.maximum(going, lone), crowd)
@@ -363,7 +333,8 @@ class NetworkFluid:
         push = np.where(held[:, None], 0.0, pressed)
         if self.case.drag.pressure_gradient:
             local = self._viscosity * volume * (speed * np.where(within, share, 0.0))
-            push = -pack.scale * intact.gradient * local[:, None] + push
+            gradient = pack.shape.pressure_gradient_at(measured.position)
+            push = -pack.scale * gradient * local[:, None] + push
 
         # the push of the intact pack's gradient is part of what the network gives to the grains
         drag = coefficient * np.where(held, velocity[:, 0], (velocity - fines.velocity)[:, 0])

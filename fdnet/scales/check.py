@@ -83,7 +83,8 @@ def width_error(width: float, *, periodic: bool) -> float:
 MOST_WIDTH_ERROR = 0.10
 """Error of the permeability by the width of the specimen, from which it is named."""
 ABSURD = 10.0
-"""Velocity over that at a usual well, from which it is named."""
+"""Velocity over that at a usual well, from which it is named; the square of it where the case gives
+the velocity or a plug."""
 FINE_SHARE, MOST_FINE_COST = 0.1, 3.0
 """Share of the finest solids, and the time with them over that without, from which it is named."""
 MOST_COARSE = 0.25
@@ -132,7 +133,9 @@ def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Fin
     losses = Losses(viscous=case.fluid.viscosity_Pa_s / scales.permeability)
     usual = losses.velocity(case.fluid.overbalance_Pa, radial(radius, outer)) / scales.porosity
     ratio = scales.interstitial_velocity / usual
-    if not 1 / ABSURD <= ratio <= ABSURD:
+    given = case.fluid.velocity_m_s is not None or case.fluid.darcy_length_m is not None
+    odd = ABSURD**2 if given else ABSURD
+    if not 1 / odd <= ratio <= odd:
         yield Finding(
             key="well",
             what=f"the fluid moves at {scales.interstitial_velocity:.3g} m/s in the pores, "

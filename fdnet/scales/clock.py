@@ -27,10 +27,10 @@ TAKEN_SOLIDS = 0.25
 """The same, of what has come when the face plugs."""
 FIRST_BATCHES = 0.3
 """Share of the slab that is there before it is needed, where it comes in batches."""
-MUD_SOLIDS, MUD_PORES, MUD_FINES = 10 * TAKEN_SOLIDS, 5.0, 200_000
+MUD_SOLIDS, MUD_PORES, MUD_FINES = 10 * TAKEN_SOLIDS, 2.0, 200_000
 """Where neither `fines.count` nor `fines.slab_mm` is given the mud comes until the stop rule, but
 no more than ten times the solids that plugged the shipped cases. Fines that are too small to
-bridge end after five volumes of the pores, and no mud has more fines than the last number."""
+bridge end after two volumes of the pores, and no mud has more fines than the last number."""
 
 
 def supplied_solids(case: InvasionCase, slab: float) -> float:

@@ -20,9 +20,9 @@ from fdnet.case.file import case_from, sizes_from
 from fdnet.case.spheres import Sizes
 from fdnet.case.units import converted, share_of
 from fdnet.errors import CaseError
-from fdnet.scales.clock import PLUG_SOLIDS, spoken_time
+from fdnet.scales.clock import spoken_time
 from fdnet.scales.cost import cost_of
-from fdnet.scales.drag import MOST_REYNOLDS, STOKES_REYNOLDS, throat_width
+from fdnet.scales.drag import throat_width
 from fdnet.scales.flow import carman_kozeny
 from fdnet.scales.pack import grain_count
 from fdnet.scales.questions import QUESTIONS, Question, by_options
@@ -98,10 +98,6 @@ def _curve(group: str, answers: Answers) -> dict[str, Any]:
 # What fdnet chooses for a case, and the tables of the case file.
 
 
-PLUG_RATE = 0.05
-"""Share of the supply that still enters a plugged face."""
-
-
 class Budget(NamedTuple):
     """How large a specimen may be, and how long it may take.
 
@@ -133,12 +129,6 @@ class Choice:
         sand_cut: percent of the sand left out at the fine end.
         mud_cut: percent of the solids below the coarse cut.
         cut: m, diameter below which solids are left out; 0 for none.
-        slab: m of mud; 0 where it comes until the stop rule.
-        supply_share: solids supplied over those that are expected to plug the face.
-        stiffness: N/m.
-        driven: whether the fines are driven faster than the fluid.
-        inertia: whether drag is that of Schiller and Naumann.
-        cap: s, or None.
         passing: m, diameter up to which solids pass the throats.
     """
 
@@ -148,12 +138,6 @@ class Choice:
     sand_cut: float
     mud_cut: float
     cut: float
-    slab: float
-    supply_share: float
-    stiffness: float
-    driven: bool = False
-    inertia: bool = False
-    cap: float | None = None
     passing: float = 0.0
 
 
@@ -195,7 +179,6 @@ def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
             **({"cut": um(choice.cut)} if choice.cut else {}),
             solids: answers["solids"],
             "density": answers["solids_density"],
-            **({"slab": mm(choice.slab)} if choice.slab else {}),
         },
         "fluid": {
             "viscosity": answers["viscosity"],
@@ -206,15 +189,6 @@ def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
             "radius": answers["well_radius"],
             **({} if outer == usual["drainage_radius"] else {"drainage_radius": outer}),
             **({"formation_permeability": known} if known else {}),
-        },
-        "drag": {
-            **({"drive_velocity_m_s": "auto"} if choice.driven else {}),
-            **({"inertia": "schiller-naumann"} if choice.inertia else {}),
-        },
-        "run": {
-            "stiffness": f"{choice.stiffness:g} N/m",
-            "plug_rate": PLUG_RATE,
-            **({"cap": f"{1e3 * choice.cap:.3g} ms"} if choice.cap else {}),
         },
         "analysis": {"sections": choice.sections},
     }
@@ -236,7 +210,6 @@ def um(length: float) -> str:
 
 SECTION = 2.0
 """Thickness of a section in mean grain diameters."""
-STIFFNESSES = (30.0, 60.0, 100.0, 200.0, 500.0, 1e3, 2e3, 5e3, 1e4)
 SAND_CUTS = (1.0, 2.0, 5.0, 10.0)
 """Shares of the finest sand, percent, that may be left out to clear the coarsest mud."""
 LEAST_KEPT = 0.5
@@ -249,10 +222,6 @@ GAP = 0.95
 """Largest fine over smallest grain."""
 MOST_COARSE = 0.35
 """Share of the coarsest solids that may be left out."""
-PATIENCE = 1.5
-"""Cap over the expected time, and over that in which what surely plugs the face arrives."""
-OF_CONTACTS = {"predicted-overlap", "pressure-on-the-deposit", "cohesion", "fines-lock"}
-"""Warnings that contacts are too soft, or hold fines."""
 USUAL_SIZES = {"sand_d10": "0.3 mm", "sand_d50": "0.5 mm", "sand_d90": "0.7 mm"}
 USUAL_SIZES |= {"mud_d10": "60 um", "mud_d50": "80 um", "mud_d90": "100 um"}
 USUAL_SIZES |= {"sand_file": "", "mud_file": ""}
@@ -263,9 +232,6 @@ USUAL_CHOICE = Choice(
     sand_cut=1.0,
     mud_cut=99.0,
     cut=0.0,
-    slab=0.0,
-    supply_share=1.0,
-    stiffness=STIFFNESSES[-1],
 )
 """Sizes and a specimen in which answers that are not about sizes are looked at."""
 
@@ -378,9 +344,6 @@ def _first_choice(answers: Answers, budget: Budget, sand: Sizes, mud: Sizes) -> 
         sand_cut=sand_cut,
         mud_cut=mud_cut,
         cut=0.0,
-        slab=0.0,
-        supply_share=1.0,
-        stiffness=STIFFNESSES[-1],
         passing=FINEST_OF_THROAT * throat,
     )
 
@@ -408,7 +371,7 @@ def _clear_cuts(sand: Sizes, mud: Sizes) -> tuple[float, float]:
 
 
 def _candidates(first: Choice, curve: SizeCurve) -> Iterator[Choice]:
-    """From all solids that matter to half of them, and then with less mud.
+    """From all solids that matter to half of them.
 
     Solids that pass are left out, unless hardly any others are there.
     """
@@ -419,50 +382,15 @@ def _candidates(first: Choice, curve: SizeCurve) -> Iterator[Choice]:
     while _kept_above(curve, finest := 1.1 * finest) >= LEAST_KEPT:
         choice = replace(first, cut=float(f"{finest:.2g}"))
         yield choice
-    while choice.supply_share > 0.3:
-        choice = replace(choice, supply_share=0.85 * choice.supply_share)
-        yield choice
 
 
 def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> Design:
-    """The candidate with its supply, contacts, drag and cap."""
-
-    def scales(trial: Choice) -> InvasionScales:
-        return invasion_scales(_case(answers, trial, folder))
-
+    """The candidate as a case, with its time."""
     case = _case(answers, choice, folder)
-    median = case.grains.curve.size_at(0.5)
-    plugs = _up(choice.supply_share * PLUG_SOLIDS * median / case.fines.placed_fraction)
-    choice = replace(choice, slab=plugs if choice.supply_share < 1.0 else 0.0)
-    # the softest contacts whose predicted overlaps stay below run.max_overlap
-    for stiffness in STIFFNESSES:
-        trial = replace(choice, stiffness=stiffness)
-        try:
-            if not OF_CONTACTS & {one.kind for one in scales(trial).warnings}:
-                choice = trial
-                break
-        except CaseError:
-            continue
-    # drag of finite Reynolds numbers where they are, fines that are driven where they may be
-    inertia = STOKES_REYNOLDS < scales(choice).reynolds < MOST_REYNOLDS
-    choice = replace(choice, inertia=inertia)
-    try:
-        driven = replace(choice, driven=True)
-        choice = driven if scales(driven).force_factor > 1.1 else choice
-    except CaseError:
-        pass
-    case, sized = _case(answers, choice, folder), scales(choice)
-    cost = cost_of(case, sized)
-    arrival = plugs / sized.upstream_velocity
-    cap = _up(PATIENCE * max(cost.duration, arrival) * sized.force_factor)
-    choice = replace(choice, cap=cap)
+    scales = invasion_scales(case)
+    seconds = cost_of(case, scales).seconds
     return Design(
-        answers=answers,
-        choice=choice,
-        case=_case(answers, choice, folder),
-        scales=scales(choice),
-        budget=budget,
-        seconds=cost.seconds,
+        answers=answers, choice=choice, case=case, scales=scales, budget=budget, seconds=seconds
     )
 
 
@@ -538,7 +466,6 @@ def _notes(design: Design) -> dict[str, str]:
     case, choice, scales = design.case, design.choice, design.scales
     grains, mean = case.grains.curve, case.grains.sauter_diameter_m
     throat = throat_width(scales.porosity, scales.permeability)
-    overlap = max(scales.impact_overlap, scales.drag_overlap)
     notes = {
         "box.size": (
             f"Depth, width, width. The width is {choice.width / mean:.2g} mean grains "
@@ -556,16 +483,6 @@ def _notes(design: Design) -> dict[str, str]:
             f"{scales.interstitial_velocity:.2g} m/s in the pores."
         ),
         "fines.sizes": f"The throats of the sand are some {um(throat)} wide.",
-        "fines.slab": _slab_note(design) if choice.slab else "",
-        "run.stiffness": (
-            "Contacts as soft as they may be: the time of the run goes with the root of it, and "
-            f"the predicted overlap is {100 * overlap:.1f} % of a fine."
-        ),
-        "run.plug_rate": (
-            f"The face counts as plugged when less than {100 * PLUG_RATE:g} % of the fines that "
-            f"arrive still enter, for {_ms(scales.plug_time * scales.force_factor)}."
-        ),
-        "run.cap": "The end at the latest; a summary that says cap is not final.",
     }
     if choice.sand_cut > 1.0:
         notes["grains.sizes"] = (
@@ -583,21 +500,7 @@ def _notes(design: Design) -> dict[str, str]:
         )
     if choice.cut:
         notes["fines.cut"] = _cut_note(design, throat)
-    if choice.driven:
-        notes["drag.drive_velocity_m_s"] = (
-            "The fines have no inertia to speak of, so the simulation runs "
-            f"{scales.force_factor:.2g} times as fast as the fluid."
-        )
-    if choice.inertia:
-        notes["drag.inertia"] = (
-            f"The Reynolds number of the largest fine is {scales.reynolds:.2g}: Stokes's drag "
-            "would be too small."
-        )
     return notes
-
-
-def _ms(seconds: float) -> str:
-    return f"{1e3 * seconds:.3g} ms"
 
 
 def _cut_note(design: Design, throat: float) -> str:
@@ -612,17 +515,6 @@ def _cut_note(design: Design, throat: float) -> str:
     )
 
 
-def _slab_note(design: Design) -> str:
-    scales, choice = design.scales, design.choice
-    feeding = scales.slab_length / scales.upstream_velocity
-    return (
-        f"Length of mud that is supplied: {scales.supplied_count} fines, all of them at the face "
-        f"after {_ms(feeding * scales.force_factor)}. It is {100 * choice.supply_share:.0f} % of "
-        "what surely plugs the face, because more does not fit the time: if the summary says "
-        "supply_exhausted, more mud would do more damage."
-    )
-
-
 def left_out(design: Design) -> Iterator[str]:
     """What of the sand and the mud is not in the case, and whether that was enough."""
     choice, curve = design.choice, design.case.fines.curve
@@ -632,8 +524,6 @@ def left_out(design: Design) -> Iterator[str]:
         yield f"left out: {100 * curve.below:.2g} % of the solids, finer than {um(curve.low)}"
     if curve.above > 0.0:
         yield f"left out: {100 * curve.above:.2g} % of the solids, coarser than {um(curve.high)}"
-    if choice.supply_share < 1.0:
-        yield f"mud: {100 * choice.supply_share:.0f} % of what surely plugs the face"
     if design.seconds > 1.05 * design.budget.seconds:
         yield (
             f"longer than the {spoken_time(design.budget.seconds)} of --size "

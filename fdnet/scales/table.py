@@ -143,7 +143,8 @@ def _fine_rows(case: InvasionCase, scales: InvasionScales) -> Iterator[Quantity]
     yield row(f"{case.contact.model}_drag", scales.drag_overlap)
     if case.drag.field == "network":
         yield row("deposit", scales.deposit_overlap, chain=LARGEST_CHAIN)
-    most = ", at most" if case.fines.endless else ""
+    endless = isinstance(case, InvasionCase) and case.fines.endless
+    most = ", at most" if endless else ""
     yield row("fines", scales.supplied_count, most=most)
     yield row("slab", scales.slab_length, most=most)
     yield row("feeding", scales.slab_length / scales.upstream_velocity)

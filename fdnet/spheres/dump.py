@@ -3,14 +3,12 @@
 Text dumps of LIGGGHTS and LAMMPS: the one parser, and the columns fdnet writes.
 """
 
-import csv
 import io
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -286,7 +284,7 @@ class DumpReader:
         )
 
     def careful(self, head: Head, body: bytes, needed: Sequence[int]) -> Array:
-        """The rows as numbers, whatever white space parts them; names the first that is bad."""
+        """The rows as numbers, one by one; names the first that is bad."""
         rows = []
         for line, row in enumerate(body.split(b"\n"), start=head.line):
             parts = row.split()
@@ -319,48 +317,19 @@ def _number(text: bytes) -> float:
         return np.nan
 
 
-def exact_numbers() -> dict[str, Any]:
-    """The option with which pandas reads every digit; from pandas 3 on that is the default."""
-    import pandas as pd
-
-    return {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
-
-
 def _table(head: Head, body: bytes, needed: Sequence[int]) -> Array | None:
-    """The rows as numbers (N, needed), or None unless single spaces part finite numbers."""
-    import pandas as pd
-
-    trailing = body[: body.find(b"\n")].endswith(b" ")
-    marks, each = np.frombuffer(body, np.uint8), len(head.columns) - 1 + trailing
-    ends, spaces = np.flatnonzero(marks == ord("\n")), np.flatnonzero(marks == ord(" "))
-    if len(ends) != head.count or len(spaces) != each * head.count:
-        return None
-    in_row = np.empty((head.count, each + 2), np.int64)
-    in_row[:, 0], in_row[0, 0], in_row[1:, 0] = 0, -1, ends[:-1]
-    in_row[:, 1:-1], in_row[:, -1] = spaces.reshape(head.count, each), ends
-    width = np.diff(in_row)
-    if np.any(width[:, : each + 1 - trailing] < 2) or (trailing and np.any(width[:, -1] != 1)):
+    """The rows as numbers (N, needed), or None unless each has its values and all are finite."""
+    marks = np.frombuffer(body.rstrip() + b"\n", np.uint8)
+    printed = marks > ord(" ")
+    begun = np.cumsum(printed & ~np.append(False, printed[:-1]))
+    values = np.diff(begun[marks == ord("\n")], prepend=0)
+    if np.any((values != 0) & (values != len(head.columns))):
         return None
     try:
-        table = pd.read_csv(
-            io.BytesIO(body),
-            sep=" ",
-            header=None,
-            names=list(range(len(head.columns) + trailing)),
-            usecols=list(needed),
-            dtype=np.float64,
-            engine="c",
-            quoting=csv.QUOTE_NONE,
-            na_filter=False,
-            index_col=False,
-            on_bad_lines="error",
-            skip_blank_lines=False,
-            **exact_numbers(),
-        )
-    except (ValueError, pd.errors.ParserError):
+        table = np.loadtxt(io.BytesIO(body), comments=None, usecols=list(needed), ndmin=2)
+    except ValueError:
         return None
-    values = table.to_numpy()
-    return values if len(values) == head.count and np.all(np.isfinite(values)) else None
+    return table if len(table) == head.count and np.all(np.isfinite(table)) else None
 
 
 # ------------------------------------------------------------------------------------------------

@@ -63,12 +63,6 @@ def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
     return Path(path)
 
 
-def read_csv(path: str | Path, *, units: str | None = None) -> SphereRows:
-    """The spheres of a table in a text file, in metres; see `table_rows`."""
-    data = file_bytes(path, most=LARGE, what="a file of spheres")
-    return table_rows(data, str(path), units=units)
-
-
 def table_rows(data: bytes, source: str, *, units: str | None = None) -> SphereRows:
     """The spheres of a table in text, in metres.
 

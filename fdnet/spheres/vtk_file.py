@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.files import LARGE, file_bytes
 from fdnet.spheres.rows import PLACES, RADII, SphereRows, columns_of, named, rows_from, scale_of
 from fdnet.spheres.snapshot import Array
 
@@ -27,11 +26,6 @@ _XML_READERS |= {b"UnstructuredGrid": "vtkXMLUnstructuredGridReader"}
 _SECONDS = 600
 _MEMORY, _GROWTH = 2**30, 20
 """Memory that the child may take, bytes, besides this many times the size of the file."""
-
-
-def read_vtk(path: Path, *, units: str | None = None) -> SphereRows:
-    """The spheres of a VTK file, in metres; see `vtk_spheres`."""
-    return vtk_spheres(file_bytes(path, most=LARGE, what="spheres"), str(path), units=units)
 
 
 def vtk_spheres(data: bytes, source: str, *, units: str | None = None) -> SphereRows:

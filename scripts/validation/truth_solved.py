@@ -301,7 +301,7 @@ def solved_anew(name: str, *, quick: bool = False) -> Iterator[dict[str, Any]]:
 
 CAKES = Path(__file__).with_name("cakes.npz")
 CAKE_SIDES = (False, True, True)
-CAKE_CELLS = (4.5, 6.75)
+CAKE_CELLS = (3.0, 4.5)
 """Cells of the two grids across the Sauter mean radius of the fines."""
 
 
@@ -319,7 +319,7 @@ def cake_solved(name: str) -> dict[str, Any]:
     flows = [solve_slab(solid, (-thickness, 0.0), cells=n, tolerance=1e-3) for n in grids]
     end, law = estimate(*flows, with_fines=True), float(resistance.sum())
     row = {"cake": name, "fines": len(fines), "thickness_mm": thickness / MM}
-    row |= {f"grid_{n}_1_m": thickness / one.k for n, one in zip(CAKE_CELLS, flows, strict=True)}
+    row |= {f"grid_{n:g}_1_m": thickness / one.k for n, one in zip(CAKE_CELLS, flows, strict=True)}
     resolved = thickness / end.k
     row |= {"resolved_1_m": resolved, "error": end.error, "law_1_m": law}
     return row | {"law_over_resolved": law / resolved}

@@ -85,7 +85,7 @@ def test_every_stop_reason_is_told_and_fines_that_pass_are_removed(go, tmp_path,
     """Five fines that wait at the face do not say that it is plugged."""
     passing = ("fines.radius_mm=0.02", "fines.friction=0.0", "fines.count=200", "run.cap_ms=3.0")
     monkeypatch.setattr(clock, "MUD_PORES", 0.06)
-    for number, (reason, *keys) in enumerate(
+    for turn, (reason, *keys) in enumerate(
         [
             ("cap", "run.cap_ms=0.05"),
             ("plugged", "fines={radius_mm=0.12, count=60}"),
@@ -94,7 +94,7 @@ def test_every_stop_reason_is_told_and_fines_that_pass_are_removed(go, tmp_path,
             ("supply_exhausted", *passing),
         ]
     ):
-        result = go(tiny(*keys), tmp_path / str(number))
+        result = go(tiny(*keys), tmp_path / str(turn))
         assert result.stop_reason == reason
         said = any("the mud was cut off after" in warning for warning in result.warnings)
         assert said == (reason == "mud_cut_off")

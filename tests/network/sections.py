@@ -17,12 +17,9 @@ from fdnet.network.laws.cross_section import (
     LANES,
     Sections,
     WallCuts,
+    disc_fluxes,
+    disc_room,
     edge_fluxes,
-    even_fluxes,
-    even_room,
-    tangents,
-    uneven_fluxes,
-    uneven_room,
     wall_fluxes,
 )
 from fdnet.network.laws.wedges import ratio_table
@@ -48,17 +45,10 @@ def sections_with(discs: Array) -> Sections:
     return Sections(throat=FIRST, side=FIRST, low=none, step=none, disc=discs[None].copy())
 
 
-def even_flux(base: Array, disc: float) -> float:
-    """Flux m4 through the triangle `base` (3, 2) m with equal discs of radius `disc` m."""
-    base, flux, given = base[None], np.empty((1, 1)), sections_with(np.full((3, 1), disc))
-    even_fluxes(FIRST, given, base, tangents(base), ratio_table(), even_room(1), flux)
-    return float(flux[0, 0])
-
-
-def uneven_flux(base: Array, disc: Array) -> float:
+def disc_flux(base: Array, disc: Array) -> float:
     """Flux m4 through the triangle `base` (3, 2) m with discs of the radii `disc` (3,) m."""
     flux, given = np.empty((1, 1)), sections_with(np.asarray(disc)[:, None])
-    uneven_fluxes(FIRST, given, base[None], ratio_table(), uneven_room(1), flux)
+    disc_fluxes(FIRST, given, base[None], ratio_table(), disc_room(1), flux)
     return float(flux[0, 0])
 
 

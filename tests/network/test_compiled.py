@@ -55,13 +55,10 @@ def twice(x):
 
 print(twice(int(sys.argv[1])), twice.stats.cache_hits and 1 or 0)
 """
-SPOILT = {
-    "empty": lambda content: b"",
-    "one bit": lambda content: content[:90] + bytes([content[90] ^ 1]) + content[91:],
-}
+SPOILT = {"empty": lambda content: b"", "cut": lambda content: content[: len(content) // 2]}
 
 
-def test_a_bad_or_foreign_cache_is_left_aside_and_made_anew(tmp_path):
+def test_a_bad_cache_is_left_aside_and_made_anew(tmp_path):
     """A program with one compiled function; a spoilt file costs one sentence and no result."""
     (tmp_path / "program.py").write_text(SOURCE)
 
@@ -72,7 +69,7 @@ def test_a_bad_or_foreign_cache_is_left_aside_and_made_anew(tmp_path):
         return done.stderr
 
     answer(False, 0)
-    for kind, how in (("nbi", "empty"), ("nbc", "one bit")):
+    for kind, how in (("nbi", "empty"), ("nbc", "cut")):
         (file,) = tmp_path.rglob(f"program.twice*.{kind}")
         file.write_bytes(SPOILT[how](file.read_bytes()))
         assert str(file.parent) in answer(False, 1), (kind, how)

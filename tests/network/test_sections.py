@@ -6,15 +6,14 @@ import pytest
 from fdnet.network.laws import deposit_resistances as deposit
 from fdnet.network.laws import wedges
 from tests.network.sections import (
+    disc_flux,
     edge_flux,
-    even_flux,
     from_python,
     resolved_beside_walls,
     resolved_flux,
-    uneven_flux,
     wall_flux,
 )
-from tests.network.wedge_table import exact_flux
+from tests.network.wedge_table import exact_flux, ray_flux
 
 EQUAL_SIDES = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, np.sqrt(0.75)]])
 RIGHT_ISOSCELES = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
@@ -25,24 +24,6 @@ ACUTE = np.array([[0.0, 0.0], [2.0, 0.0], [1.1175, 1.7808]])
 # Wedges and the rule of tubes.
 
 
-def rays(angle, disc):
-    """The flux on rays by quadrature, where each has Happel's flow in an annulus."""
-    point, weight = np.polynomial.legendre.leggauss(64)
-    first = np.arccos(1.0 / disc) if disc > 1.0 else 0.0
-    d = 1.0 / np.cos(first + 0.5 * (angle - first) * (1.0 + point))
-    flux = (4.0 * d**4 * np.log(d / disc) - 3.0 * d**4 + 4.0 * d**2 * disc**2 - disc**4) / 16.0
-    return float(0.5 * (angle - first) * np.sum(weight * flux))
-
-
-def test_the_closed_form_of_the_rays_is_their_integral():
-    for degrees, disc in [(5, 0.3), (30, 1.0), (60, 0.9), (70, 0.1), (50, 1.2), (80, 1.05)]:
-        angle = np.radians(degrees)
-        flux = wedges.ray_flux(angle, np.tan(angle), disc)
-        assert flux == pytest.approx(rays(angle, disc), rel=1e-9), (degrees, disc)
-    angle = np.radians(30.0)
-    assert wedges.ray_flux(angle, np.tan(angle), 1.16) == 0.0, "a disc that fills the wedge"
-
-
 def test_the_table_is_the_series_of_sparrow_and_loeffler():
     """Rays are an upper bound; between its points the table is good to a thousandth."""
     table = wedges.ratio_table()
@@ -50,11 +31,11 @@ def test_the_table_is_the_series_of_sparrow_and_loeffler():
     assert np.all(table[0] == 1.0)
     for row, column in [(5, 4), (15, 20), (22, 10), (30, 18), (40, 1)]:
         angle, disc = wedges.ANGLES[row], wedges.DISCS[column]
-        expected = exact_flux(angle, disc) / wedges.ray_flux(angle, np.tan(angle), disc)
+        expected = exact_flux(angle, disc) / ray_flux(angle, disc)
         assert table[row, column] == pytest.approx(expected, abs=1e-6), (row, column)
     for degrees, disc in [(31, 0.52), (44.9, 0.77), (59.1, 0.93), (17.3, 0.4)]:
         angle = np.radians(degrees)
-        exact = exact_flux(angle, disc) / wedges.ray_flux(angle, np.tan(angle), disc)
+        exact = exact_flux(angle, disc) / ray_flux(angle, disc)
         assert wedges.shear_ratio(angle, disc, table) == pytest.approx(exact, rel=1e-3), degrees
 
 
@@ -80,19 +61,17 @@ def test_the_rule_of_tubes_against_the_exact_hyperboloid():
 def test_sections_of_equal_wedges():
     """Six of 30 degrees in an equilateral triangle, four of 45 in half a square."""
     exact = 6.0 * exact_flux(np.pi / 6.0, 0.9)
-    assert even_flux(2.0 * EQUAL_SIDES, 0.9) == pytest.approx(exact, rel=1e-4)
+    assert disc_flux(2.0 * EQUAL_SIDES, np.full(3, 0.9)) == pytest.approx(exact, rel=1e-4)
     assert resolved_flux(2.0 * EQUAL_SIDES, np.full(3, 0.9)) == pytest.approx(exact, rel=1e-3)
     exact = 4.0 * exact_flux(np.pi / 4.0, 0.95)
-    assert even_flux(RIGHT_ISOSCELES, 0.95) == pytest.approx(exact, rel=2e-3)
+    assert disc_flux(RIGHT_ISOSCELES, np.full(3, 0.95)) == pytest.approx(exact, rel=2e-3)
     assert resolved_flux(RIGHT_ISOSCELES, np.full(3, 0.95)) == pytest.approx(exact, rel=1e-3)
 
 
 def test_equal_discs_against_finite_elements():
     for disc in (0.3, 0.7, 0.93):
         exact = resolved_flux(ACUTE, np.full(3, disc))
-        assert even_flux(ACUTE, disc) == pytest.approx(exact, rel=0.01), disc
-    uneven = uneven_flux(ACUTE, np.full(3, 0.93))
-    assert uneven == pytest.approx(even_flux(ACUTE, 0.93), rel=1e-4)
+        assert disc_flux(ACUTE, np.full(3, disc)) == pytest.approx(exact, rel=0.01), disc
 
 
 def test_equal_discs_in_an_obtuse_triangle_against_finite_elements():
@@ -101,7 +80,7 @@ def test_equal_discs_in_an_obtuse_triangle_against_finite_elements():
         base = np.array([[0.0, 0.0], [edge, 0.0], [edge / 2, np.sqrt(4.0 - edge**2 / 4)]])
         for disc in (0.6, 0.9, 0.98):
             discs = np.full(3, disc)
-            ratio = uneven_flux(base, discs) / resolved_flux(base, discs)
+            ratio = disc_flux(base, discs) / resolved_flux(base, discs)
             assert ratio == pytest.approx(1.0, abs=0.13), (edge, disc)
 
 
@@ -114,7 +93,7 @@ def test_unequal_discs_against_finite_elements():
     ]:
         base, discs = np.array([[0.0, 0.0], [edge, 0.0], apex]), np.array(disc)
         exact = resolved_flux(base, discs)
-        assert uneven_flux(base, discs) / exact == pytest.approx(ratio, abs=0.01), (apex, disc)
+        assert disc_flux(base, discs) / exact == pytest.approx(ratio, abs=0.01), (apex, disc)
 
 
 def test_sections_whose_signed_shares_cancel_are_summed_over_rays():
@@ -126,11 +105,11 @@ def test_sections_whose_signed_shares_cancel_are_summed_over_rays():
     ]:
         base, discs = np.array([[0.0, 0.0], [1.0, 0.0], apex]), np.array(disc)
         exact = resolved_flux(base, discs, 400)
-        assert uneven_flux(base, discs) / exact == pytest.approx(ratio, abs=0.02), apex
+        assert disc_flux(base, discs) / exact == pytest.approx(ratio, abs=0.02), apex
     # a small disc near the line between two large ones, and a closed section
     base = np.array([[0.0, 0.0], [3.0, 0.0], [1.608, 0.2306]])
-    assert 0.0 < uneven_flux(base, np.array([1.2458, 1.2458, 0.1584])) < 1e-2
-    assert uneven_flux(2.0 * EQUAL_SIDES, np.full(3, 1.2)) == 0.0
+    assert 0.0 < disc_flux(base, np.array([1.2458, 1.2458, 0.1584])) < 1e-2
+    assert disc_flux(2.0 * EQUAL_SIDES, np.full(3, 1.2)) == 0.0
 
 
 # ------------------------------------------------------------------------------------------------

@@ -114,7 +114,7 @@ def test_a_finer_grid_is_closer():
     assert errors[1] < 0.6 * errors[0] < 0.2
 
 
-def test_fines_turn_the_flow_and_those_off_the_grid_are_left_out_and_counted():
+def test_fines_turn_the_flow_and_those_off_the_grid_are_left_out():
     place = points(600)
     place = place[np.any(field("xyz").at(place), axis=1)][:60]
     fines = Snapshot.from_arrays(place, 0.2, box=pack().box, kind="fine")
@@ -127,7 +127,7 @@ def test_fines_turn_the_flow_and_those_off_the_grid_are_left_out_and_counted():
     far = [[-30.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
     both = Snapshot.from_arrays(far, 0.2, box=pack().box, kind="fine")
     current = fdnet.velocity_field(pack(), periodic="yz", fines=both, cells=6.0, upstream=2.0)
-    assert current.left_out == 1
+    assert current.inside.tolist() == [False, True]
     assert np.all(current.fine_force[0] == 0.0)
 
 

@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from fdnet.network.laws.wedges import ANGLES, DISCS, TABLE, ray_flux
+from fdnet.network.laws.wedges import ANGLES, DISCS, TABLE
 from fdnet.spheres.snapshot import Array
 
 THINNEST = 0.02
@@ -48,12 +48,27 @@ def exact_flux(angle: float, disc: float, *, terms: int = 24, points: int = 300)
     return float(np.sum(0.25 * angle * weight[:, None] * weight * depth * speed * r))
 
 
+def ray_flux(angle: float, disc: float) -> float:
+    """Flux over h^4 on the rays of a wedge up to its far side, for a disc of rho / h.
+
+    The integral of (4 d^4 ln(d / rho) - 3 d^4 + 4 d^2 rho^2 - rho^4) / 16 over the angle, with
+    d = h / cos(angle). A disc that overlaps the next one leaves only the rays open that leave it
+    before the far side.
+    """
+    first = np.arccos(1.0 / disc) if disc > 1.0 else 0.0
+    point, weight = np.polynomial.legendre.leggauss(80)
+    turn = first + 0.5 * max(angle - first, 0.0) * (1.0 + point)
+    d = 1.0 / np.cos(turn)
+    flux = 4.0 * d**4 * np.log(d / disc) - 3.0 * d**4 + 4.0 * d**2 * disc**2 - disc**4
+    return float(0.5 * max(angle - first, 0.0) * np.sum(weight * flux) / 16.0)
+
+
 def make_table() -> Array:
     """The ratios of `ratio_table`, computed; the ratio of a wedge of angle 0 is 1."""
     table = np.ones((len(ANGLES), len(DISCS)))
     for i, angle in enumerate(ANGLES[1:], start=1):
         for j, disc in enumerate(np.maximum(DISCS, THINNEST)):
-            table[i, j] = exact_flux(angle, disc) / ray_flux(angle, np.tan(angle), disc)
+            table[i, j] = exact_flux(angle, disc) / ray_flux(angle, disc)
     return table
 
 

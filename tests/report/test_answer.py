@@ -10,7 +10,7 @@ from builders import naming
 from scipy.integrate import solve_ivp
 
 from fdnet.report.tables import in_millidarcy, millidarcy, percent
-from fdnet.report.text import answer_sentence, in_place_words
+from fdnet.report.text import answer_sentence, facts, in_place_words
 from fdnet.run.answer import (
     FULL,
     QUICK,
@@ -226,6 +226,20 @@ SUMMARY = {
 WELL = {"skin": 0.056, "skin_flow_lost": 0.0081, "skin_well_radius_m": 0.108}
 
 
+FOLLOWED = {"drag_last_update": {"k_over_k0": 0.278}, "damage_law_used": "thesis"}
+
+
+def test_each_number_of_two_laws_names_its_own():
+    """The thesis's law says 0.733 of k0, the network of the flow 0.278."""
+    counts = dict.fromkeys(("supplied_count", "passed_count", "upstream_count"), 900)
+    more = {"k_damaged_m2": 1.466e-12, "k_reduction": 0.267, "porosity_damaged": 0.3}
+    more |= {"invasion_depth_m": 2e-3, "cake_thickness_m": 0.0, "law": "thesis", **counts}
+    said = {one.name: one.text for one in facts(SUMMARY | more | FOLLOWED)}
+    assert said["permeability"].endswith("26.7 % lost by the law thesis")
+    assert said["flow"].startswith("72.2 % lost as the flow met it last: by section-archie with")
+    assert "flow" not in {one.name for one in facts(SUMMARY | more | {"damage_law": "thesis"})}
+
+
 def test_the_answer_is_a_sentence_to_act_on():
     for changed, said, not_said in [
         ({}, ["within 1.39 mm", "keep 34 %", "deeper than 2 mm", "less than 5 %"], "skin"),
@@ -233,6 +247,12 @@ def test_the_answer_is_a_sentence_to_act_on():
         (WELL | {"skin": None, "skin_flow_lost": 1.0}, ["skin is infinite"], "small"),
         (WELL | {"skin": -1e-4, "skin_flow_lost": -1e-5}, ["this is no skin"], "-"),
         ({"final": False, "stop_reason": "cap"}, ["not final", "run.cap_ms"], "deeper"),
+        (
+            {"final": False, "stop_reason": "mud_cut_off"},
+            ["mud was cut off", "fines.slab_mm"],
+            "cap",
+        ),
+        (FOLLOWED, ["keep 34 % of the permeability (by the law thesis)"], "all-spheres"),
         ({"invaded_count": 0}, ["No fine entered"], "95 %"),
     ]:
         with naming(changed, said, not_said):

@@ -17,9 +17,8 @@ from fdnet.errors import CaseError
 from fdnet.files import replacing, write_text
 from fdnet.report import picture, vtk
 from fdnet.report.tables import section_rows, write_sections, write_summary
-from fdnet.spheres.readers import read_csv
+from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Kind
-from fdnet.spheres.vtk_file import read_vtk
 
 pytestmark = pytest.mark.liggghts
 BOX = np.array([[0.0, 4e-3], [0.0, 2e-3], [0.0, 2e-3]])
@@ -111,9 +110,9 @@ def test_spheres_read_back_in_metres_and_from_no_spheres(finished, tmp_path):
     assert np.array_equal(mesh.points, snapshot.position)
     for name, array in vtk.SPHERE_ARRAYS.items():
         assert np.array_equal(mesh.point_data[array], getattr(snapshot, name))
-    assert np.array_equal(read_vtk(path).radius, snapshot.radius)
+    assert np.array_equal(read_spheres(path).radius, snapshot.radius)
     with pytest.raises(CaseError, match=r"radius_m is in m; leave out --units mm"):
-        read_vtk(path, units="mm")
+        read_spheres(path, units="mm")
     none = vtk.write_spheres_vtp(tmp_path / "spheres_none.vtp", snapshot.grains().fines())
     assert pv.read(none).n_points == 0
 
@@ -226,9 +225,8 @@ def test_fluxes_in_paraview_follow_from_pressures_and_conductances(finished, tmp
 # ---- Sphere tables: nothing is lost by writing.
 def columns(path, **units):
     """Position, radius and kind; without a column kind all are grains."""
-    rows = read_csv(path, **units)
-    kind = np.full(len(rows.radius), Kind.GRAIN) if rows.kind is None else rows.kind
-    return rows.position, rows.radius, kind
+    rows = read_spheres(path, **units)
+    return rows.position, rows.radius, rows.kind
 
 
 def csv_of(folder, text, *, encoding="utf-8"):
@@ -294,7 +292,7 @@ def test_every_malformed_table_is_refused_with_file_and_line(tmp_path):
     for name, (text, message) in BROKEN.items():
         path = csv_of(tmp_path, text)
         with naming(name), pytest.raises(CaseError) as caught:
-            read_csv(path, units="mm")
+            read_spheres(path, units="mm")
         assert str(caught.value).startswith(str(path)), name
         assert message in str(caught.value), name
 
@@ -307,10 +305,10 @@ def test_what_is_no_text_file_or_has_another_unit_is_refused(tmp_path):
         ("x,y,z,radius", "inch", "units 'inch': expected one of m, cm, mm, um"),
     ):
         with pytest.raises(CaseError, match=message):
-            read_csv(csv_of(tmp_path, header + "\n1,2,3,4\n"), units=units)
+            read_spheres(csv_of(tmp_path, header + "\n1,2,3,4\n"), units=units)
     with pytest.raises(CaseError, match="No such file"):
-        read_csv(tmp_path / "none.csv", units="m")
+        read_spheres(tmp_path / "none.csv", units="m")
     with pytest.raises(CaseError, match="irectory"):
-        read_csv(tmp_path, units="m")
+        read_spheres(tmp_path, units="m")
     with pytest.raises(CaseError, match="radius is '4 µm'"):
-        read_csv(csv_of(tmp_path, "x,y,z,radius\n1,2,3,4 µm", encoding="latin-1"), units="m")
+        read_spheres(csv_of(tmp_path, "x,y,z,radius\n1,2,3,4 µm", encoding="latin-1"), units="m")

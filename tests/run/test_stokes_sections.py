@@ -75,6 +75,23 @@ def test_the_network_agrees_with_the_flow_between_the_spheres(resolved):
 
 
 @pytest.mark.liggghts
+def test_no_slip_walls_are_those_of_resolved_flow_with_and_without_fines(tmp_path):
+    """A real pack in a box; with walls that slip the same section conducts far more."""
+    case = tiny("run.cap_ms=0.35", "box.sides=walls", "analysis.walls=no-slip")
+    run = fdnet.run_case(case, tmp_path / "run", stages=("pack", "invade", "analyse"))
+    stokes_sections(run.path, (1,), across=ROUGH)
+    (row,) = with_network(read_sections(run.path / "stokes" / "sections.csv"), run.summary)
+    slips = case.analysis.model_copy(update={"walls": "slip"})
+    spheres = run.spheres("initial"), run.spheres()
+    slipping = fdnet.analyse(*spheres, periodic=case.periodic, options=slips).sections[0]
+    for key in ("k_initial", "k_damaged"):
+        held, flow = row[f"network_{key}_m2"], row[f"{key}_m2"]
+        assert abs(held / flow - 1.0) < 0.12 + row[f"{key}_error"], key
+        assert getattr(slipping, key) > 1.15 * held, key
+    assert row["k_damaged_m2"] < 0.9 * row["k_initial_m2"]
+
+
+@pytest.mark.liggghts
 def test_a_cut_computation_goes_on_behind_its_last_grid(resolved, tmp_path, monkeypatch):
     folder = Path(shutil.copytree(resolved, tmp_path / "run"))
     grids, table = folder / "stokes" / "grids.json", folder / "stokes" / "sections.csv"

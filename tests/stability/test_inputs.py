@@ -13,7 +13,6 @@ from fdnet.spheres.dump import parse_dump
 from tests.network.packs import random_pack, snapshot
 
 UNIT = ("--units", "mm", "--box", "0,4,0,4,0,4")
-HOSTILE = ["nan", "NaN", "inf", "-inf", "1e400", "-1e999", "", "1,5", "0x10", "1_0", "none"]
 
 
 def permeability(capsys, path: Path, *options: str) -> tuple[int, str, str]:
@@ -35,16 +34,6 @@ def table(path: Path, **swap: str) -> None:
     for name, text in swap.items():
         rows[2][names.index(name)] = text
     path.write_text("\n".join([",".join(names), *map(",".join, rows)]) + "\n")
-
-
-def test_numbers_that_are_none_in_a_table_are_refused_with_their_line(tmp_path, capsys):
-    for column in ("x", "radius"):
-        for text in HOSTILE:
-            table(tmp_path / "s.csv", **{column: text})
-            code, out, err = permeability(capsys, tmp_path / "s.csv", *UNIT)
-            assert (code, out, len(err.splitlines())) == (2, "", 1), (column, text)
-            assert "s.csv:4" in err
-    assert list(tmp_path.iterdir()) == [tmp_path / "s.csv"]
 
 
 def test_radii_beyond_reason_are_refused(tmp_path, capsys):

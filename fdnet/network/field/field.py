@@ -33,16 +33,12 @@ class VelocityField:
     Attributes:
         grains: centres (G, 3) m and radii (G,) m of the grains that hold the fluid.
         fines: centres (N, 3) m and radii (N,) m of the fines that hold the fluid.
-        left_out: number of fines that were given but lie outside of the grid.
-        tolerance: rms velocity over U that may be left at the walls.
         solved: the flow on the grid.
-        inside: (N,) which of the fines given are on the grid.
+        inside: (N,) which of the fines given are on the grid; the others are left out.
     """
 
     grains: tuple[Array, Array]
     fines: tuple[Array, Array]
-    left_out: int
-    tolerance: float
     solved: GridFlow
     inside: Array
 
@@ -298,8 +294,6 @@ def solved_field(
     return VelocityField(
         grains=grains,
         fines=fines,
-        left_out=int(np.sum(~inside)),
-        tolerance=tolerance,
         solved=solve(lattice, position, radius, grain=grain, slip=tolerance),
         inside=frozen(inside),
     )

@@ -10,7 +10,6 @@ import numpy as np
 
 from fdnet.network.compiled import loops_in_place, loops_inside
 from fdnet.network.laws.wedges import (
-    DISCS,
     FINE_POINTS,
     FINE_WEIGHTS,
     POINTS,
@@ -21,11 +20,8 @@ from fdnet.network.laws.wedges import (
     flux_on_ray,
     log_of,
     midway,
-    ray_flux,
-    ray_parts,
     shear_ratio,
     sine_of,
-    table_row,
 )
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
@@ -311,14 +307,11 @@ def flux_on_rays(rays: Array, count: int, own: float, part: Array, table: Array)
 # Every disc slows the fluid between its rim and the line midway to the next rim; these shares are
 # cut into wedges (`wedges`).
 #
-# Equal discs in a triangle that holds its circumcentre: six right-angled wedges about it, in
-# closed form.
-#
-# Unequal discs: the line midway between two rims is a hyperbola. From the centre of a disc it lies
-# at the distance d(t) = (a^2 - e^2) / (2 (a cos t + e)) on the ray at the angle t from the line
-# between the centres, with the difference e of the radii and the distance a of the centres. The
-# shares meet in the centre of the circle that touches all three discs. The flux on rays is summed
-# by Gauss points, and the shear between rays is that of the wedge of the same angle and half gap.
+# The line midway between two rims is a hyperbola. From the centre of a disc it lies at the
+# distance d(t) = (a^2 - e^2) / (2 (a cos t + e)) on the ray at the angle t from the line between
+# the centres, with the difference e of the radii and the distance a of the centres. The shares
+# meet in the centre of the circle that touches all three discs. The flux on rays is summed by
+# Gauss points, and the shear between rays is that of the wedge of the same angle and half gap.
 #
 # Where that circle lies beyond an edge, as in every obtuse triangle with equal discs, the shares
 # there are negative, and they take away too much: all of the flux between touching discs at an
@@ -334,109 +327,8 @@ TURN = 0.05
 edge, the rays have taken over. Finite elements agree with them there (test_section_flux.py)."""
 
 
-def tangents(base: Array) -> Array:
-    """Tangents (K, 3) of half the angles that the edges of triangles `base` (K, 3, 2) m show.
-
-    They are seen from the circumcentre; the angle at the far corner is that over half the edge. A
-    tangent is negative where the circumcentre lies beyond the edge.
-    """
-    tangent = np.empty((len(base), 3))
-    for i in range(3):
-        e, f = base[:, (i + 1) % 3] - base[:, i], base[:, (i + 2) % 3] - base[:, i]
-        g = base[:, (i + 2) % 3] - base[:, (i + 1) % 3]
-        area = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0])
-        tangent[:, i] = (f[:, 0] * g[:, 0] + f[:, 1] * g[:, 1]) / area
-    return tangent
-
-
-class EvenRoom(NamedTuple):
-    """Room for `even_fluxes`."""
-
-    wedge: Array
-    """(3, 5): half the edge m and its logarithm, the parts of `ray_parts`, and the angle rad."""
-    ratio: Array
-    """(3, 21): rows of the table of `shear_ratio`."""
-    log_disc: Array
-    """(n,)"""
-    rays: Array
-    """(n,) flux on rays."""
-
-
-def even_room(count: int) -> EvenRoom:
-    """Room for `count` sections."""
-    return EvenRoom(
-        wedge=np.empty((3, 5)),
-        ratio=np.empty((3, len(DISCS))),
-        log_disc=np.empty(count),
-        rays=np.empty(count),
-    )
-
-
-@loops_in_place
-def even_fluxes(
-    rows: Array,
-    sections: Sections,
-    base: Array,
-    tangent: Array,
-    table: Array,
-    room: EvenRoom,
-    flux: Array,
-) -> None:
-    """Writes the `flux` (S, n) m4 of laplacian(w) = -1 in the sides `rows` with equal discs.
-
-    Each edge has two wedges. In an obtuse triangle their signed sum is too small, and
-    `uneven_fluxes` does it.
-
-    Args:
-        rows: numbers of the sides.
-        sections: of all sides.
-        base: (K, 3, 2) m, corners of the facets.
-        tangent: (K, 3) of `tangents`.
-        table: of `shear_ratio`.
-        room: written to.
-        flux: of all sides.
-    """
-    log_disc, rays, wedge, before = room.log_disc, room.rays, room.wedge, -1
-    for s in rows:
-        t = sections.throat[s]
-        disc, out = sections.disc[s, 0], flux[s]
-        if t != before:
-            before = t
-            for i in range(3):
-                j, slope = (i + 1) % 3, abs(tangent[t, i])
-                half = 0.5 * np.hypot(base[t, j, 0] - base[t, i, 0], base[t, j, 1] - base[t, i, 1])
-                angle = np.arctan(slope)
-                wedge[i, 0], wedge[i, 1], wedge[i, 4] = half, np.log(half), angle
-                wedge[i, 2], wedge[i, 3] = ray_parts(angle, slope)
-                row, ratio = table_row(angle), room.ratio[i]
-                first = min(int(row), len(table) - 2)
-                part, low, high = row - first, table[first], table[first + 1]
-                for j in range(len(ratio)):
-                    ratio[j] = (1.0 - part) * low[j] + part * high[j]
-        for k in range(len(disc)):
-            log_disc[k] = log_of(disc[k])
-            out[k] = 0.0
-        for i in range(3):
-            half, log_half, constant, of_log = wedge[i, 0], wedge[i, 1], wedge[i, 2], wedge[i, 3]
-            slope, ratio = abs(tangent[t, i]), room.ratio[i]
-            angle = wedge[i, 4]
-            factor = 2.0 * half**4 if tangent[t, i] > 0.0 else -2.0 * half**4
-            for k in range(len(disc)):
-                x = disc[k] / half
-                square = x * x
-                whole = constant - of_log * (log_disc[k] - log_half)
-                rays[k] = factor * (whole + square * (4.0 * slope - square * angle) / 16.0)
-            for k in range(len(disc)):
-                x = disc[k] / half
-                if x > 1.0:
-                    rays[k] = factor * ray_flux(angle, slope, x)
-                column = min(x, 1.0) * (len(ratio) - 1)
-                j = min(int(column), len(ratio) - 2)
-                out[k] += rays[k] * (ratio[j] + (column - j) * (ratio[j + 1] - ratio[j]))
-
-
-class UnevenRoom(NamedTuple):
-    """Room for `uneven_fluxes`."""
+class DiscRoom(NamedTuple):
+    """Room for `disc_fluxes`."""
 
     wedge: Array
     """(7, 6 n): of each wedge the excess of the radius of the other disc, half the gap squared,
@@ -448,19 +340,27 @@ class UnevenRoom(NamedTuple):
     rays: CornerRays
 
 
-def uneven_room(count: int) -> UnevenRoom:
+def disc_room(count: int) -> DiscRoom:
     """Room for `count` sections."""
-    return UnevenRoom(wedge=np.empty((7, 6 * count)), edges=np.empty((6, 4)), rays=corner_rays())
+    return DiscRoom(wedge=np.empty((7, 6 * count)), edges=np.empty((6, 4)), rays=corner_rays())
 
 
 @loops_in_place
-def uneven_fluxes(
-    rows: Array, sections: Sections, base: Array, table: Array, room: UnevenRoom, flux: Array
+def disc_fluxes(
+    rows: Array, sections: Sections, base: Array, table: Array, room: DiscRoom, flux: Array
 ) -> None:
-    """Writes the `flux` (S, n) m4 of the sides `rows`, whatever their discs; as `even_fluxes`.
+    """Writes the `flux` (S, n) m4 of laplacian(w) = -1 in the sides `rows` between three discs.
 
     The first corner of a facet is the origin, the second lies on the x axis. The flux is 0 where
     the discs close the triangle.
+
+    Args:
+        rows: numbers of the sides.
+        sections: of all sides.
+        base: (K, 3, 2) m, corners of the facets.
+        table: of `shear_ratio`.
+        room: written to.
+        flux: of all sides.
     """
     aimed = -1
     for s in rows:
@@ -480,7 +380,7 @@ def uneven_fluxes(
 
 
 @loops_inside
-def touching_fluxes(base: Array, disc: Array, table: Array, room: UnevenRoom, flux: Array) -> None:
+def touching_fluxes(base: Array, disc: Array, table: Array, room: DiscRoom, flux: Array) -> None:
     """Writes the flux (n,) m4 where a circle touches all three discs (3, n) m, else 0.
 
     Shares are negative where the circle lies beyond an edge of the triangle.
@@ -658,7 +558,7 @@ def wall_fluxes(
 ) -> None:
     """Writes the `flux` (S, n) m4 of the sides `rows` between a wall and two discs.
 
-    `lanes` (`LANES`, n) is written to; the others are as in `even_fluxes`.
+    `lanes` (`LANES`, n) is written to; the others are as in `disc_fluxes`.
     """
     for s in rows:
         t = sections.throat[s]

@@ -30,12 +30,9 @@ from fdnet.network.laws.cross_section import (
     LANES,
     Sections,
     WallCuts,
+    disc_fluxes,
+    disc_room,
     edge_fluxes,
-    even_fluxes,
-    even_room,
-    tangents,
-    uneven_fluxes,
-    uneven_room,
     wall_cuts,
     wall_fluxes,
 )
@@ -61,10 +58,6 @@ TIP = 1e-2
 """Smallest radius of the disc that a grain shows in a section, in radii of the grain."""
 THROATS = 20_000
 """Throats that are worked off at once."""
-EQUAL = 1e-9
-"""Radii that differ by at most this share are equal."""
-OBTUSE = 1e-6
-"""Tangent of the least angle by which the circumcentre of an obtuse facet lies beyond an edge."""
 
 
 class Prepared(NamedTuple):
@@ -76,10 +69,6 @@ class Prepared(NamedTuple):
     """(K, 3) m2, of the radii of the discs in the facets."""
     flatness: Array
     """(K, 3) of these discs (`discs_of`)."""
-    even: Array
-    """(K,) whether the discs are equal and the facet is not obtuse."""
-    tangent: Array
-    """(K, 3) of `tangents`."""
     walls: WallCuts
     is_cut: Array
     """(K,) whether an x face cuts a grain of the throat."""
@@ -91,18 +80,12 @@ def prepared(network: Network, part: slice, walls: WallCuts) -> Prepared:
     """What the sections of the throats `part` (K) need; `walls` is what `wall_cuts` gives."""
     images = network.throat_images[part]
     facet = network.image_position[images]
-    base = geometry.flat(facet)
     radius, flatness = discs_of(network, images, facet)
-    tangent = tangents(base)
-    unlike = np.abs(radius - np.roll(radius, 1, axis=1)) > EQUAL * radius[:, :1]
-    unlike |= np.abs(flatness - np.roll(flatness, 1, axis=1)) > EQUAL
     cut = cut_corners(network, part, facet)
     return Prepared(
-        base=base,
+        base=geometry.flat(facet),
         square=radius * radius,
         flatness=flatness,
-        even=~np.any(unlike | (tangent < -OBTUSE), axis=1),
-        tangent=tangent,
         walls=WallCuts(*(one[part] for one in walls)),
         is_cut=np.any(cut[:, :, 3] > 0.0, axis=1),
         cut=cut,
@@ -212,14 +195,8 @@ def clear_fluxes(given: Prepared, sections: Sections) -> Array:
     flux = np.empty((len(sections.throat), count))
     order = walls.order[sections.throat]
     at_wall, in_edge = order[:, 1] >= 0, (order[:, 1] < 0) & (order[:, 0] >= 0)
-    even = given.even[sections.throat] & (order[:, 0] < 0)
-    uneven = ~(at_wall | in_edge | even)
-    if even.any():
-        rows, room = np.flatnonzero(even), even_room(count)
-        even_fluxes(rows, sections, given.base, given.tangent, table, room, flux)
-    if uneven.any():
-        rows, more = np.flatnonzero(uneven), uneven_room(count)
-        uneven_fluxes(rows, sections, given.base, table, more, flux)
+    rows = np.flatnonzero(~(at_wall | in_edge))
+    disc_fluxes(rows, sections, given.base, table, disc_room(count), flux)
     lanes = np.empty((LANES, count))
     if at_wall.any():
         wall_fluxes(np.flatnonzero(at_wall), sections, walls, table, lanes, flux)

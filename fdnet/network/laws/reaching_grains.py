@@ -512,7 +512,7 @@ def cut_fluxes(
     """Multiplies the `flux` (S, n) of the sides `rows` by M_cut / M_corner.
 
     `cut` (K, 3, 4) m is of `cut_corners`, `discs` (2, 3, 3) is written to; the others are as in
-    `even_fluxes`.
+    `disc_fluxes`.
     """
     for s in rows:
         t = sections.throat[s]

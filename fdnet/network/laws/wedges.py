@@ -112,10 +112,10 @@ def angle_of(y: float, x: float) -> float:
 # holds the fluid still; the straight sides carry no shear. The speed w solves laplacian(w) = -1,
 # and its flux over h^4 depends on phi and x = rho / h alone.
 #
-# `ray_flux` neglects the shear between neighbouring rays from the tip: on each ray the flow is
-# that in the annulus of Happel (1959) whose free surface is at the far side. It is an upper bound.
-# The exact flux is the series of Sparrow and Loeffler (1959, AIChE J. 5, 325), fitted to the far
-# side by least squares. Their ratio varies slowly; `ratio_table` reads it from wedge.csv, which
+# The flux on rays from the tip neglects the shear between neighbours: on each ray the flow is that
+# in the annulus of Happel (1959) whose free surface is at the far side. It is an upper bound. The
+# exact flux is the series of Sparrow and Loeffler (1959, AIChE J. 5, 325), fitted to the far side
+# by least squares. Their ratio varies slowly; `ratio_table` reads it from wedge.csv, which
 # `python -m tests.network.wedge_table` writes anew.
 
 
@@ -127,53 +127,11 @@ DISCS = np.linspace(0.0, 1.0, 21)
 
 
 @loops_in_place
-def ray_flux(angle: float, slope: float, disc: float) -> float:
-    """Flux over h^4 of a wedge of `angle` rad with the tangent `slope`, for `disc` = rho / h.
-
-    Closed form of the integral of (4 d^4 ln(d / rho) - 3 d^4 + 4 d^2 rho^2 - rho^4) / 16 over the
-    angle, with d = h / cos(angle). A disc that overlaps the next one (rho > h) leaves only the
-    rays open that leave it before the far side.
-    """
-    whole = _antiderivative(angle, slope, disc)
-    if disc <= 1.0:
-        return whole
-    first = np.arccos(1.0 / disc)
-    if angle <= first:
-        return 0.0
-    return whole - _antiderivative(first, np.sqrt(disc * disc - 1.0), disc)
-
-
-@loops_inside
-def _antiderivative(angle: float, slope: float, disc: float) -> float:
-    constant, of_log = ray_parts(angle, slope)
-    square = disc * disc
-    return constant - of_log * np.log(disc) + square * (4.0 * slope - square * angle) / 16.0
-
-
-@loops_inside
-def ray_parts(angle: float, slope: float) -> tuple[float, float]:
-    """The parts C and D of a flux over h^4 for rho <= h, which depend on the wedge alone.
-
-    `ray_flux` is C - D ln(x) + (4 x^2 tan(phi) - x^4 phi) / 16, with x = rho / h.
-    """
-    square = slope * slope
-    secant4 = slope * (1.0 + square / 3.0)
-    log_secant = 0.5 * np.log1p(square)
-    spread = secant4 * log_secant - (slope - angle) * 2.0 / 3.0 - slope * square / 9.0
-    return (4.0 * spread - 3.0 * secant4) / 16.0, 0.25 * secant4
-
-
-@loops_inside
-def table_row(angle: float) -> float:
-    """The row of the table of `shear_ratio` for an angle, with its fraction."""
-    return min(angle / STEEPEST, 1.0) * (len(ANGLES) - 1)
-
-
-@loops_in_place
 def shear_ratio(angle: float, disc: float, table: Array) -> float:
-    """Exact flux over `ray_flux`, bilinear in `table`; steeper wedges take its last row."""
+    """Exact flux over that on rays, bilinear in `table`; steeper wedges take its last row."""
     rows, columns = table.shape
-    row, column = table_row(angle), min(disc, 1.0) * (columns - 1)
+    row = min(angle / STEEPEST, 1.0) * (rows - 1)
+    column = min(disc, 1.0) * (columns - 1)
     i, j = min(int(row), rows - 2), min(int(column), columns - 2)
     u, v = row - i, column - j
     low = (1.0 - v) * table[i, j] + v * table[i, j + 1]
@@ -183,7 +141,7 @@ def shear_ratio(angle: float, disc: float, table: Array) -> float:
 
 @lru_cache(maxsize=1)
 def ratio_table() -> Array:
-    """Exact flux over `ray_flux` at ANGLES (rows) and DISCS (columns)."""
+    """Exact flux over that on rays at ANGLES (rows) and DISCS (columns)."""
     return np.loadtxt(TABLE, delimiter=",")
 
 

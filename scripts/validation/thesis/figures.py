@@ -151,9 +151,8 @@ def _depth(figure: Any, panel: Any, sources: Sources) -> None:
         runs, thesis = sources.runs[specimen], thesis_of(specimen)
         for name, colour in zip(panel.names, (BLUE, ORANGE), strict=False):
             edges = _by_depth(runs[0], name)[0]
-            style = _style(runs)
-            if len(panel.names) > 1:
-                style = {"colour": colour, "label": name}
+            several = len(panel.names) > 1
+            style = {"colour": colour, "label": name} if several else _style(runs)
             _stairs(axes, edges, [_by_depth(run, name)[1] for run in runs], **style)
     if len(panel.specimens) == 1 and panel.names[0] == LOST:
         whole, face = thesis["porosity_loss"], thesis.get("face_porosity_loss")
@@ -213,14 +212,11 @@ def _distance(figure: Any, panel: Any, sources: Sources) -> None:
     (axes,) = _axes(figure, panel)
     values, edges = _distances(panel, sources), np.linspace(0.0, 2.0, 21)
     height = np.histogram(values, edges)[0] / len(values)
-    for part, colour, words in (
-        (slice(0, 5), ORANGE, "nearer the axis"),
-        (slice(5, 10), BLUE, "nearer the wall"),
-        (slice(10, 20), GREY, "centred beyond the wall"),
-    ):
-        high = edges[part.stop] if part.stop < 20 else np.inf
-        share = np.mean((values >= edges[part.start]) & (values < high))
-        label = f"{words}: {100 * share:.2g} %"
+    words = ("nearer the axis", "nearer the wall", "centred beyond the wall")
+    parts, ends = (slice(0, 5), slice(5, 10), slice(10, 20)), [0.0, 0.5, 1.0, np.inf]
+    shares = np.histogram(values, ends)[0] / len(values)
+    for part, colour, word, one in zip(parts, (ORANGE, BLUE, GREY), words, shares, strict=True):
+        label = f"{word}: {100 * one:.2g} %"
         axes.bar(edges[part], height[part], 0.1, align="edge", color=colour, label=label)
     lines = [f"{len(values)} fines"]
     for claim in published()["deposition"]:
@@ -350,12 +346,5 @@ def _spheres(figure: Any, panel: Any, sources: Sources) -> None:
     _finish(figure, panel, [words])
 
 
-KINDS: Mapping[str, Callable[..., None]] = {
-    "depth": _depth,
-    "density": _density,
-    "distance": _distance,
-    "sections": _sections,
-    "bars": _bars,
-    "scan": _scan,
-    "spheres": _spheres,
-}
+_ALL = (_depth, _density, _distance, _sections, _bars, _scan, _spheres)
+KINDS: Mapping[str, Callable[..., None]] = {one.__name__[1:]: one for one in _ALL}

@@ -170,12 +170,9 @@ CUT = "with those cut by a face, by the part inside"
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Section:
-    """Pores (P) and throats (T), weighted for the first millimetre.
+    """Pores (P) and throats (T) of a run, weighted for the first millimetre by WHOLE or CUT.
 
-    Attributes:
-        reading: WHOLE or CUT.
-        weight: of "pore" and "throat": 1 for one that counts whole, 0 for one elsewhere.
-        run: the run.
+    The weight of "pore" and "throat" is 1 for one that counts whole and 0 for one elsewhere.
     """
 
     reading: str

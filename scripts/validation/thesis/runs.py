@@ -28,14 +28,9 @@ from validation.thesis.published import TABLE3, rows_in
 class Planned:
     """One run: a shipped case with a seed and perhaps a changed setting, from plan.csv.
 
-    Attributes:
-        group: "specimen", "variant", "quick", "reason" (what might let more fines in), or what is
-            scanned: "friction", "drag" or "supply".
-        name: name of the case, with "quick-" before it for its quick form.
-        seed: seed of the run.
-        setting: the change as "key=value"; "" for none.
-        value: value of what is scanned, "" without one.
-        consequence: a setting that follows, and does not stand in the run's name.
+    The group is "specimen", "variant", "quick", "reason" (what might let more fines in), or what
+    is scanned ("friction", "drag", "supply", with its value). The name of a quick form begins with
+    "quick-". The setting is "key=value"; the consequence is one that follows and is not named.
     """
 
     group: str
@@ -141,13 +136,9 @@ def _value(text: str) -> Any:
 class State:
     """A specimen before and after its invasion.
 
-    Attributes:
-        case: the case of the run.
-        grains: the grains as packed, m.
-        damaged: the grains and all remaining fines at the end, those upstream too, m.
-        ending: numbers of fines `supplied` and `passed`; `stop_reason`; computing times `seconds`
-            of the invasion and `pack_seconds`; number of `steps` and their length `dt_s`;
-            `max_overlap` over the smaller diameter.
+    `grains` are as packed, `damaged` are the grains and all remaining fines at the end, those
+    upstream too, m. The ending has the numbers of fines `supplied` and `passed`, `stop_reason`,
+    computing times (`seconds`, `pack_seconds`), `steps`, their length `dt_s`, and `max_overlap`.
     """
 
     case: InvasionCase
