@@ -360,7 +360,7 @@ PRESSED = 0.03
 """Largest predicted overlap of a fine over its diameter with `run.stiffness_N_m` = "auto"; the
 default of `run.max_overlap`."""
 
-STARTING = 0.25
+STARTING = 0.2
 """Stiffness over that of the largest chain of forces with which an invasion starts whose springs
 may be stiffened at a checkpoint."""
 
