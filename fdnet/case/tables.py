@@ -361,7 +361,7 @@ class Run(Part):
     """Stiffness of the stiffest contact; all others keep their ratio to it. With "hertz": force
     over overlap of a fine's stiffest contact at 1 % of its diameter. "nominal" keeps the real
     stiffness. "auto" takes the least that keeps predicted overlaps at 3 %: in the uniform field at
-    least the default; where the flow follows the deposit, a quarter of what its largest forces
+    least the default; where the flow follows the deposit, a fifth of what its largest forces
     need, raised at a checkpoint when the overlaps that are seen ask for it."""
     max_hours: Positive = 24.0
     """A case that is expected to run longer is refused before it starts."""

@@ -438,7 +438,7 @@ def time_of(row: Checkpoint, scales: InvasionScales) -> float:
 # deposit: steps of a chunk go with the root of the stiffness, so history.csv records it.
 
 
-RAISE_ABOVE, RAISE_TO, MOST_RAISE = 0.67, 0.5, 2.0
+RAISE_ABOVE, RAISE_TO, MOST_RAISE = 0.67, 0.6, 2.0
 """Shares of `PRESSED`: springs are stiffened at a checkpoint when the overlap that lasted in the
 chunk before was above the first, so that it would have been the second. At most so many times the
 steps at once."""

@@ -9,6 +9,7 @@ from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS, MOST_SLAB
 from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import (
     MOST_FALSE_FORCE,
+    SAFE_FACTOR,
     Contact,
     contacts_of,
     overlaps_of,
@@ -229,8 +230,6 @@ DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
 refuses the case."""
 LEAST_FACTOR = 0.1
 """Least time step over sqrt(m/k) that is taken so that small fines do not lock between grains."""
-SAFE_FACTOR = 0.2
-"""Time step over sqrt(m/k) that is accepted with any contact."""
 RANDOM_CLOSE = 0.36
 """Porosity of random close packing of equal spheres (Scott and Kilgour 1969)."""
 _ROUNDING = 1 + 1e-12
@@ -371,7 +370,7 @@ PRESSED = 0.03
 """Largest predicted overlap of a fine over its diameter with `run.stiffness_N_m` = "auto"; the
 default of `run.max_overlap`."""
 
-STARTING = 0.25
+STARTING = 0.2
 """Stiffness over that of the largest chain of forces with which an invasion starts whose springs
 may be stiffened at a checkpoint."""
 
@@ -454,7 +453,9 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
         run = case.run.model_copy(update={"stiffness_N_m": value, **more})
         return case.model_copy(update={"run": run})
 
-    soft = stiff(DEFAULT_STIFFNESS)
+    own = case.run.time_step_factor
+    longest = own or (CONTACT_STEP_LIMIT if start and rises(case) else SAFE_FACTOR)
+    soft = stiff(DEFAULT_STIFFNESS, time_step_factor=longest)
     if not isinstance(soft, InvasionCase):
         return soft
     porosity = target_porosity(soft)

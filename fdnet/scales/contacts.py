@@ -124,9 +124,11 @@ LEAST: Mapping[str, float] = {"hooke": 1e-6, "hertz": 0.0501}
 """Least restitution by contact model, below which nothing is lowered further. LIGGGHTS's Hertz
 model takes 0.05 and less for an error; for linear contacts it keeps the damping ratio below 1."""
 
+SAFE_FACTOR = 0.2
+"""Time step over sqrt(m/k) that is accepted with any contact."""
 LEFT = 0.18
-"""Restitution that is left to linear contacts where the flow follows the deposit, so that the
-longest step is stable (damping ratio 0.48): drag has stopped a fine before it could rebound."""
+"""Restitution that is left to linear contacts where the flow follows the deposit in longer steps,
+which are stable with it (damping ratio 0.48): drag has stopped a fine before it could rebound."""
 
 
 def pair_stokes(mass: float, radius: float, velocity: float, viscosity: float) -> float:
@@ -334,11 +336,9 @@ def _damping_and_stokes(
 def least_restitution(case: Case) -> float:
     """Restitution below which the liquid lowers nothing further."""
     least = LEAST[case.contact.model]
-    return max(least, LEFT) if _follows(case) and case.contact.model == "hooke" else least
-
-
-def _follows(case: Case) -> bool:
-    return isinstance(case, InvasionCase) and case.drag.field == "network"
+    followed = isinstance(case, InvasionCase) and case.drag.field == "network"
+    longer = (case.run.time_step_factor or SAFE_FACTOR) > SAFE_FACTOR
+    return max(least, LEFT) if followed and longer and case.contact.model == "hooke" else least
 
 
 def material_of(case: Case, name: str, factor: float) -> tuple[float, float]:

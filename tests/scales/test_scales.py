@@ -116,7 +116,7 @@ def test_springs_grow_with_the_square_of_the_steps_of_a_chunk():
     scales = invasion_scales(case)
     usual = scales.checkpoint_steps
     assert steps_after(case, usual, [0.02]) == usual
-    assert steps_after(case, usual, [0.03]) == math.ceil(usual * math.sqrt(2))
+    assert steps_after(case, usual, [0.03]) == math.ceil(usual * math.sqrt(1 / 0.6))
     assert steps_after(case, usual, [0.9]) == 2 * usual
     assert steps_after(case, usual, [0.9, *[0.02] * 10]) == usual, "an impact is no load"
     assert steps_after(case, usual, [0.9, 0.9, *[0.02] * 10]) == 2 * usual
