@@ -467,7 +467,7 @@ class InvadeStage(ChunkedStage):
                 )
             )
         before = history[-min(len(history), quiet_chunks(scales) + 1)]
-        if reason == "plugged" and last.passed > before.passed:
+        if reason == "plugged" and last.passed - before.passed > plug_allowance(case, scales):
             warnings.append(
                 Doubt(
                     "still-leaving",
