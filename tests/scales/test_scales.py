@@ -106,6 +106,9 @@ def test_a_deposit_bears_its_share_of_the_way():
     assert borne(f"run.duration_ms={1e3 * feeding!r}") == pytest.approx(fed, rel=1e-9)
     volumes = 0.1 * slab_of(case, 1.0).length / (porosity * length)
     assert borne(f"run.stop_pore_volumes={volumes!r}") == pytest.approx(fed, rel=1e-9)
+    ample = fines * 0.6 * 0.5e-3 / solids
+    until = borne("fines={radius_mm=0.05, concentration=0.1}")
+    assert until == pytest.approx(2e6 * (length + ample) / (way + ample), rel=1e-9)
     slower = 2e6 * (length + way * (1 / 0.999 - 1)) / (way / 0.999)
     assert borne("run.stop_rate=0.999") == pytest.approx(slower, rel=1e-9)
     assert deposit_pressure(tiny(*FOLLOWED), velocity_of(tiny(), porosity), porosity) <= 3.5e6
