@@ -34,6 +34,7 @@ from fdnet.dem.checkpoint import (
     lasting_overlap,
     overlap_in,
     overlap_text,
+    plug_allowance,
     quiet_chunks,
     quiet_enough,
     read_history,
