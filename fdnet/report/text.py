@@ -188,8 +188,8 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
     beyond = summary["invasion_depth_p95_m"] * (1.0 + TWICE * spread)
     if damage["reaches_the_end"] or beyond > end:
         return (
-            f"{face} The specimen is too short to say how deep a perforation, a cut or a wash must "
-            "reach: lengthen the box."
+            f"{face} The specimen is too short to say how deep a perforation, a cut or a wash "
+            "must reach: lengthen the box."
         )
     return (
         f"{face} Let a perforation, a cut or a wash reach deeper than {millimetres(beyond)}: that "

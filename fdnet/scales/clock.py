@@ -367,8 +367,7 @@ def drag_warnings(case: Case, held: float) -> list[Doubt]:
 
 
 PRESSED = 0.03
-"""Largest predicted overlap of a fine over its diameter with `run.stiffness_N_m` = "auto"; the
-default of `run.max_overlap`."""
+"""Largest predicted overlap of a fine over its diameter with `run.stiffness_N_m` = "auto"."""
 
 STARTING = 0.2
 """Stiffness over that of the largest chain of forces with which an invasion starts whose springs
