@@ -180,8 +180,10 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
     law = f" by the law {_law_of(summary)}" if followed(summary) is not None else ""
     scatter, end = summary["scatter"], summary["sections"][-1]["x_hi_m"]
     spread = scatter["depth_p95_relative"]
+    depth = millimetres(damage["face_depth_m"])
     face = (
-        f"The first {millimetres(damage['face_depth_m'])} lost {two_digits(damage['face_lost'])} "
+        f"The first {'millimetre' if depth == '1 mm' else depth} lost "
+        f"{two_digits(damage['face_lost'])} "
         f"of the permeability{law} (from seed to seed ± {100 * scatter['first_mm_loss']:.2g} "
         f"points), and {p95} (± {two_digits(spread)})."
     )
@@ -192,8 +194,8 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
             "must reach: lengthen the box."
         )
     return (
-        f"{face} Let a perforation, a cut or a wash reach deeper than {millimetres(beyond)}: that "
-        "is this depth with two standard deviations of seeds."
+        f"{face} Let a perforation, a cut or a wash reach deeper than {1e3 * beyond:.2g} mm: that "
+        "is the 95 % depth and two standard deviations of seeds."
     )
 
 

@@ -263,7 +263,12 @@ def test_the_answer_is_a_sentence_to_act_on():
     for changed, said, not_said in [
         (
             {},
-            ["first 1 mm lost 78 %", "± 6.7 points", "within 1.39 mm (± 36 %)", "than 2.39 mm"],
+            [
+                "first millimetre lost 78 %",
+                "± 6.7 points",
+                "within 1.39 mm (± 36 %)",
+                "than 2.4 mm",
+            ],
             "skin",
         ),
         ({"sections": [{"x_hi_m": 2.3e-3}]}, ["too short", "lengthen the box"], "deeper"),
