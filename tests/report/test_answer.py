@@ -205,7 +205,7 @@ def test_the_scatter_of_a_seed_is_that_of_the_published_repeats(root):
         assert one.depth == pytest.approx(((depth.std() / depth.mean()) ** 2).mean() ** 0.5, 0.02)
         assert one.loss == pytest.approx((loss.std() ** 2).mean() ** 0.5, 0.03)
     seeds = pd.read_csv(root / "docs/validation/seeds.csv").groupby("case")
-    assert dict(seeds.size()) == dict.fromkeys(FOLLOWED.cases, FOLLOWED.runs // 2)
+    assert dict(seeds.size()) == dict.fromkeys(FOLLOWED.cases, FOLLOWED.runs)
     depth, loss = seeds["invasion_depth_p95_m"], seeds["face_lost"]
     spread = ((depth.std() / depth.mean()) ** 2).mean() ** 0.5
     assert FOLLOWED.depth == pytest.approx(spread, 0.02)
