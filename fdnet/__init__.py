@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from fdnet.network.network import build_network as build_network
     from fdnet.network.permeability import analyse as analyse
     from fdnet.network.permeability import compare as compare
+    from fdnet.network.permeability import permeability as permeability
     from fdnet.run.finished import open_run as open_run
     from fdnet.run.pipeline import run_case as run_case
     from fdnet.spheres.readers import read_spheres as read_spheres
@@ -56,7 +57,7 @@ _HOMES = {
     "fdnet.campaign.api": "ensemble sweep compare_runs",
     "fdnet.spheres.snapshot": "Snapshot",
     "fdnet.spheres.readers": "read_spheres",
-    "fdnet.network.permeability": "analyse compare",
+    "fdnet.network.permeability": "permeability analyse compare",
     "fdnet.network.network": "build_network",
     "fdnet.network.fines.occupancy": "measure_occupancy",
     "fdnet.network.flow.flow": "solve_flow",
