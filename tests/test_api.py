@@ -151,7 +151,7 @@ def test_permeability_of_arrays_is_that_of_the_command(tmp_path, capsys, units, 
         grains = np.array(kinds) == "grain"
         plain = (points[grains], radii[grains], box)
         si = tuple(1e-3 / scale * np.asarray(part) for part in plain)
-        again = fdnet.analyse(si, periodic=periodic, axis="y")
+        again = fdnet.analyse(si, periodic=periodic == "xyz" or periodic, axis="y")
         assert again.k_initial == pytest.approx(one.k_initial_m2, rel=1e-9, abs=0)
 
 
