@@ -32,7 +32,7 @@ from fdnet.network.network import Network
 from fdnet.network.specimen import (
     measure_specimen,
     pack_doubts,
-    snapshot_of,
+    as_snapshot,
     specimen_doubts,
 )
 from fdnet.network.states import (
@@ -286,8 +286,8 @@ def compare(
         thesis: 1.4e-09 m2
         lubrication: 2.5e-09 m2
     """
-    base, spheres = _chosen(options, choices), snapshot_of(spheres)
-    damaged = None if damaged is None else snapshot_of(damaged, "damaged")
+    base, spheres = _chosen(options, choices), as_snapshot(spheres)
+    damaged = None if damaged is None else as_snapshot(damaged, "damaged")
     around = sides_of(spheres, periodic)
     if axis != "x":
         spheres = replace(spheres, periodic=around).turned(axis)

@@ -410,7 +410,7 @@ def measure_specimen(
     )
 
 
-def snapshot_of(spheres: object, name: str = "spheres") -> Snapshot:
+def as_snapshot(spheres: object, name: str = "spheres") -> Snapshot:
     """The spheres, from arrays in m where they are no Snapshot. Raises CaseError for all else."""
     if isinstance(spheres, Snapshot):
         return spheres

@@ -51,7 +51,7 @@ def draw(path: Path, fill: Callable[[Any], None]) -> Path:
     return path
 
 
-def shown(fill: Callable[[Any], None]) -> Any:
+def shown(fill: Callable[[Any], Any]) -> Any:
     """A figure of pyplot that `fill` draws into, for notebooks and `plt.show()`; its axes (N,)."""
     from matplotlib import pyplot, rc_context
 
