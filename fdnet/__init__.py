@@ -6,7 +6,7 @@
     run = fdnet.run_case("cases/quick.toml")      the whole story of one specimen, in a run folder
     run = fdnet.open_run("runs/quick")            the same run later
     run.k_damaged_mD, run.lost, run.plot()        its numbers, tables, spheres and network
-    runs = fdnet.open_runs("runs/mine-8")         an ensemble: runs.mean, runs.band, runs.by_depth()
+    runs = fdnet.open_runs("runs/mine-8")         an ensemble: mean, band, by_depth()
 
 Spheres from files are `read_spheres`, step by step it is `build_network`, `measure_occupancy` and
 `solve_flow`, many runs are `ensemble`, `sweep` and `compare_runs`. Every error is an `FdnetError`.

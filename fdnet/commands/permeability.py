@@ -299,7 +299,7 @@ def _along(axis: str, given: "SphereFile", options: argparse.Namespace) -> list[
     notes = list(given.warnings)
     if given.around_grains:
         notes.append(Doubt("no-box", "no --box given: the box around all grains was used"))
-    notes += pack_doubts(given.spheres, periodic, axis, options.walls)
+    notes += pack_doubts(given.spheres, axis, options.walls)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
     rows: list[dict[str, Any]] = []
     first: Analysis | None = None

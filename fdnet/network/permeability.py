@@ -30,9 +30,9 @@ from fdnet.network.laws.damage import CLEAN
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network
 from fdnet.network.specimen import (
+    as_snapshot,
     measure_specimen,
     pack_doubts,
-    as_snapshot,
     specimen_doubts,
 )
 from fdnet.network.states import (
@@ -43,7 +43,7 @@ from fdnet.network.states import (
     at_most_the_grains,
     few_throats,
 )
-from fdnet.spheres.snapshot import Array, Directions, Kind, Snapshot, frozen, sides_of
+from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, sides_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -314,7 +314,10 @@ THINNEST = 1e-3
 """Least volume of spheres over that of their box that is no slip of units."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+_DIGITS: Any = {"index": False, "float_format": "{:.4g}".format}
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
 class Permeability:
     """What `fdnet.permeability` returns: numbers of a pack, along one axis or all three.
 
@@ -322,14 +325,13 @@ class Permeability:
 
     Attributes:
         axis: "x", "y", "z" or "all".
-        k_m2: permeability of all spheres, m2.
-        k_initial_m2: permeability without the fines, m2; equal where there are none.
-        porosity: share of the box that no sphere fills, overlap counted once.
-        porosity_initial: the same without the fines.
+        k_m2: permeability with the fines, m2.
+        k_initial_m2: permeability without them, m2.
+        porosity: with the fines, overlap counted once.
+        porosity_initial: the same without them.
         law: name of the conductance law.
         damage_law: name of the damage law that was used; None without fines.
-        sections: slabs across the flow with the columns of sections.csv (m, m2); with all axes
-            the column `axis` tells them apart.
+        sections: slabs across the flow, columns as in sections.csv; for all axes also `axis`.
         warnings: doubts about the numbers, each with what follows and what to do.
     """
 
@@ -345,14 +347,13 @@ class Permeability:
 
     @property
     def k_mD(self) -> float | Array:
-        """Permeability of all spheres, mD."""
+        """Permeability with the fines, mD."""
         return self.k_m2 / M2_PER_MD
 
     def to_dict(self) -> dict[str, Any]:
         """All numbers as JSON knows them; the sections are a list of rows."""
-        own = {one.name: getattr(self, one.name) for one in fields(self)}
-        own |= {"k_mD": self.k_mD, "warnings": list(self.warnings)}
-        own["sections"] = self.sections.to_dict("records")
+        own = {one.name: getattr(self, one.name) for one in fields(self)} | {"k_mD": self.k_mD}
+        own |= {"warnings": [*self.warnings], "sections": self.sections.to_dict("records")}
         return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in own.items()}
 
     def to_frame(self) -> "pd.DataFrame":
@@ -365,13 +366,18 @@ class Permeability:
 
     def __str__(self) -> str:
         said = [f"warning: {one}" for one in self.warnings]
-        return "\n".join([self.to_frame().to_string(index=False), *said])
+        return "\n".join([self._shown().to_string(**_DIGITS), *said])
 
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
         said = "".join(f"<p>Warning: {escape(one)}</p>" for one in self.warnings)
-        return self.to_frame().to_html(index=False) + said
+        return self._shown().to_html(**_DIGITS) + said
+
+    def _shown(self) -> "pd.DataFrame":
+        frame = self.to_frame()
+        twice = [] if self.damage_law else ["k_initial_m2", "porosity_initial"]
+        return frame.drop(columns=twice)
 
 
 @with_visible_choices
@@ -401,8 +407,7 @@ def permeability(
         choices: of the analysis, as for `analyse`: `sections`, `law`, `damage_law`, `walls` ...
 
     Returns:
-        Permeability in m2 and mD, porosity, sections and warnings. Doubts that a wrong unit of
-        length leads to are also warnings of Python's.
+        Permeability in m2 and mD, porosity, sections and warnings.
 
     Raises:
         CaseError: an argument cannot be used, or box and spheres cannot be in one unit.
@@ -421,17 +426,16 @@ def permeability(
     """
     if box is None:
         raise CaseError(f"box: missing, expected its three lengths, {units}")
-    kinds = Kind.GRAIN if kind is None else kind
-    given = {"box": box, "kind": kinds, "periodic": periodic, "units": units}
+    given = {"box": box, "periodic": periodic, "units": units}
+    given |= {} if kind is None else {"kind": kind}
     spheres = Snapshot.from_arrays(points, radii, **given)
     _refuse_two_units(spheres)
-    sides = sides_of(spheres, None)
     chosen, several = AnalysisChoices.of_pack(**choices), axis == "all"
     pair, results, said, rows = (chosen.law, chosen.damage_law), [], [], []
     for one in "xyz" if several else [axis]:
         result = next(compare(spheres.turned(one), options=chosen, laws=[pair]))
         _say_aloud(result)
-        doubts = [*pack_doubts(spheres, sides, one, chosen.walls), *result.warnings]
+        doubts = [*pack_doubts(spheres, one, chosen.walls), *result.warnings]
         said += [f"{one}: {text}" if several else text for text in map(explained, doubts)]
         results.append(result)
         rows += [({"axis": one} if several else {}) | slab.row() for slab in result.sections]

@@ -26,7 +26,7 @@ from fdnet.spheres.geometry import (
     touching_pairs,
     wrapped,
 )
-from fdnet.spheres.snapshot import Array, Kind, Snapshot, one_line
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, one_line, sides_of
 
 CONTACT_GAP = 0.01
 """Spheres this far apart, in diameters of the smaller one, touch."""
@@ -158,10 +158,9 @@ def wide_fines(grains: Snapshot, fines: Snapshot) -> str:
     return ""
 
 
-def pack_doubts(
-    spheres: Snapshot, periodic: tuple[bool, bool, bool], axis: str, walls: str
-) -> Iterator[str]:
+def pack_doubts(spheres: Snapshot, axis: str, walls: str) -> Iterator[str]:
     """Doubts about spheres from anywhere, with flow along `axis`: walls crossed, and overlaps."""
+    periodic = sides_of(spheres, None)
     if walls == "no-slip":
         yield from _crossing(spheres, periodic, axis)
     seen = spheres.where(~inside_others(spheres, periodic)[0])

@@ -138,10 +138,10 @@ class Snapshot:
         Four grains of 0.25 mm and a fine of 50 um between them:
 
         >>> import fdnet
-        >>> places = [[0, 0, 0], [5e-4, 0, 0], [0, 5e-4, 0], [0, 0, 5e-4], [1.6e-4] * 3]
-        >>> radii = [2.5e-4] * 4 + [5e-5]
+        >>> places = [[0, 0, 0], [0.5, 0, 0], [0, 0.5, 0], [0, 0, 0.5], [0.16] * 3]
+        >>> radii = [0.25] * 4 + [0.05]
         >>> kinds = ["grain"] * 4 + ["fine"]
-        >>> spheres = fdnet.Snapshot.from_arrays(places, radii, kind=kinds)
+        >>> spheres = fdnet.Snapshot.from_arrays(places, radii, kind=kinds, units="mm")
         >>> spheres
         Snapshot(4 grains, 1 fine, step 0, box 1 x 1 x 1 mm)
         >>> spheres.fines().radius.tolist()

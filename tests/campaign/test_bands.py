@@ -145,17 +145,19 @@ def test_one_variant_is_not_ranked(tmp_path):
 def test_runs_open_as_one_object_with_bands_by_quantity_and_by_depth(tmp_path):
     """t(2) = 4.302653 of any table; the spread of 1, 2, 3 is 1."""
     half = 4.302653 / math.sqrt(3)
-    names = ("x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged", "k_initial_m2")
+    names = ("section", "x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged", "k_initial_m2")
     names += ("k_damaged_m2", "k_reduction", "fines_count", *IN_PLACE)
     for seed in (1, 2, 3):
         k = (1e-11, seed * 1e-11, 0.5, 4, 1e-11, seed * 1e-11)
-        rows = [dict(zip(names, (lo, lo + 1e-3, 0.4, 0.3, *k), strict=True)) for lo in (0.0, 1e-3)]
+        edges = ((1, 0.0, 1e-3), (2, 1e-3, 2e-3))
+        rows = [dict(zip(names, (*own, 0.4, 0.3, *k), strict=True)) for own in edges]
         finished_run(tmp_path / f"r{seed}", tiny(f"seed={seed}"), skin=float(seed), sections=rows)
     runs = fdnet.open_runs(tmp_path)
     assert runs.mean["skin"] == 2.0
     row = runs.band.loc["skin"]
     assert [*row] == pytest.approx([2, 2 - half, 2 + half, 3], rel=1e-6)
     depth = runs.by_depth()
+    assert "section_low" not in depth
     assert depth[["section", "x_lo_m", "x_hi_m"]].to_numpy().tolist() == [
         [1, 0, 1e-3],
         [2, 1e-3, 2e-3],
