@@ -197,11 +197,6 @@ def types_of(text: str) -> dict[int, str]:
 
 
 PROFILE_BINS = 32
-_TOUCH = 0.2
-"""Part of its radius by which a sphere may reach across a wall: pressed grains do."""
-_MANY = 0.25
-"""Part of the spheres that would cross the sides of a periodic pack, above which those that cross
-side walls are reported."""
 _LARGE_FINE = 0.5
 """Part of the smallest grain's radius up to which spheres of type 2 are fines unasked."""
 
@@ -296,6 +291,7 @@ def _read(options: argparse.Namespace) -> "SphereFile":
 
 def _along(axis: str, given: "SphereFile", options: argparse.Namespace) -> list[dict[str, Any]]:
     """What each pair of laws gives for flow along `axis`, the chosen pair first."""
+    from fdnet.network.specimen import pack_doubts
     from fdnet.report.text import thesis_law_warning
 
     spheres, along, periodic = given.spheres.turned(axis), "xyz".index(axis), given.periodic
@@ -303,9 +299,7 @@ def _along(axis: str, given: "SphereFile", options: argparse.Namespace) -> list[
     notes = list(given.warnings)
     if given.around_grains:
         notes.append(Doubt("no-box", "no --box given: the box around all grains was used"))
-    if options.walls == "no-slip":
-        notes += _crossing(given.spheres, periodic, axis)
-    notes += _overlaps(spheres, around)
+    notes += pack_doubts(given.spheres, axis, options.walls)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
     rows: list[dict[str, Any]] = []
     first: Analysis | None = None
@@ -374,39 +368,6 @@ def _assumptions(
         yield f"The conductance law is fdnet's default, {DEFAULT_LAW}."
     if len(spheres.fines()):
         yield "Fines and grains stay where they are."
-
-
-def _overlaps(spheres: "Snapshot", periodic: tuple[bool, bool, bool]) -> Iterator[str]:
-    """Warnings where the spheres that add to the solid overlap, as `fdnet run` has them."""
-    from fdnet.spheres.geometry import inside_others, max_overlap, overlap_doubts
-
-    seen = spheres.where(~inside_others(spheres, periodic)[0])
-    return overlap_doubts(
-        max_overlap(seen.grains(), periodic), max_overlap(seen, periodic, only_fines=True)
-    )
-
-
-def _crossing(spheres: "Snapshot", periodic: tuple[bool, bool, bool], axis: str) -> Iterator[str]:
-    """A warning where many spheres reach across the side walls, as those of a periodic pack do."""
-    import numpy as np
-
-    walls = np.array([not periodic[k] and "xyz"[k] != axis for k in range(3)])
-    reach = spheres.radius[:, None] * (1 - _TOUCH)
-    low, high = spheres.box.T
-    beyond = ((spheres.position - reach < low) | (spheres.position + reach > high)) & walls
-    count = int(np.sum(beyond.any(axis=1)))
-    expected = 2.0 * reach.mean() * len(spheres) * np.sum(walls / (high - low))
-    if count > max(_MANY * expected, 3):
-        sides = "".join(
-            name
-            for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
-            if crossed or repeats
-        )
-        yield Doubt(
-            "crossing-walls",
-            f"{count} of {len(spheres)} spheres cross the side walls; if the pack is periodic "
-            f"give --periodic {sides}",
-        )
 
 
 def _sides(periodic: tuple[bool, bool, bool], options: argparse.Namespace) -> str:
