@@ -306,7 +306,7 @@ make_venv() {
 install_fdnet() {
     local what="$root"
     [ "$mode" = headless ] || what="${root}[$mode]"
-    say "installing fdnet and its Python libraries into .venv (SIZE)"
+    say "installing fdnet and its Python libraries into .venv (about 0.6 GB, with VTK 1.2 GB)"
     quietly "$venv/bin/python" -m pip install -q --disable-pip-version-check --no-input \
         -e "$what" ||
         fail "pip install failed (above):" \
