@@ -190,3 +190,28 @@ def test_laws_of_the_thesis_are_said_to_be_wrong_with_the_default_beside(finishe
     assert "warning: the laws thesis and thesis are kept to compare" in capsys.readouterr().out
     assert main(["permeability", spheres]) == 0
     assert "thesis" not in capsys.readouterr().out
+
+
+NINE_LINES = """
+name = "nine"
+box.size = ["3 mm", "2 mm", "2 mm"]
+grains.sizes = { D10 = "0.25 mm", D50 = "0.40 mm", D90 = "0.60 mm" }
+grains.porosity = "38 %"
+fines.sizes = { D10 = "70 um", D50 = "90 um", D90 = "115 um" }
+fines.concentration = "5 %"
+fluid.viscosity = "10 cP"
+fluid.overbalance = "300 psi"
+well.radius = "108 mm"
+"""
+
+
+def test_nine_lines_and_the_shipped_cases_have_nothing_odd(root, tmp_path):
+    """The flow follows the deposit, and no key of forces, contacts or supply is needed."""
+    (tmp_path / "nine.toml").write_text(NINE_LINES)
+    names = ("quick", "well", "sand-and-mud", "reservoir-sand", "growing-cake")
+    for path in (tmp_path / "nine.toml", *(root / "cases" / f"{name}.toml" for name in names)):
+        case = fdnet.read_case(path)
+        with naming(path):
+            assert checked(case, scales_of(case)).findings == ()
+            assert case.drag.coupled
+            assert case.fines.endless or path.stem == "growing-cake"

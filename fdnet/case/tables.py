@@ -365,8 +365,9 @@ class Run(Part):
     need, raised at a checkpoint when the overlaps that are seen ask for it."""
     max_hours: Positive = 24.0
     """A case that is expected to run longer is refused before it starts."""
-    max_overlap: Fraction = 0.03
-    """Overlap of a fine, over the smaller diameter, above which `on_overlap` applies."""
+    max_overlap: Fraction = 0.05
+    """Overlap of a fine, over the smaller diameter, above which `on_overlap` applies. Springs by
+    "auto" aim at 3 %, and few fines are pressed in deeper."""
     on_overlap: Literal["warn", "stop"] = "warn"
     """What follows then: a warning ("warn"), or the run stops with its state kept ("stop")."""
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] | None = None

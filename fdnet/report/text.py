@@ -157,6 +157,10 @@ def answer_sentence(summary: Mapping[str, Any]) -> str:
     return f"{depth} {_skin_words(summary)}" if "skin" in summary else depth
 
 
+TWICE = 2.0
+"""Standard deviations of seeds that are added to a depth before it is acted on."""
+
+
 def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
     depth = millimetres(summary["invasion_depth_p95_m"])
     p95, limit = (
@@ -173,18 +177,23 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
         )
     if not damage["zone_depth_m"]:
         return f"{p95}, and no layer loses {limit} of its permeability: the damage is negligible."
-    share = f"{two_digits(damage['zone_k_over_k0'])} of the permeability"
-    if followed(summary) is not None:
-        share += f" (by the law {_law_of(summary)})"
-    if damage["reaches_the_end"]:
+    law = f" by the law {_law_of(summary)}" if followed(summary) is not None else ""
+    scatter, end = summary["scatter"], summary["sections"][-1]["x_hi_m"]
+    spread = scatter["depth_p95_relative"]
+    face = (
+        f"The first {millimetres(damage['face_depth_m'])} lost {two_digits(damage['face_lost'])} "
+        f"of the permeability{law} (from seed to seed ± {100 * scatter['first_mm_loss']:.2g} "
+        f"points), and {p95} (± {two_digits(spread)})."
+    )
+    beyond = summary["invasion_depth_p95_m"] * (1.0 + TWICE * spread)
+    if damage["reaches_the_end"] or beyond > end:
         return (
-            f"{p95}, and the damage reaches the end of the specimen, which keeps {share}: "
-            "lengthen the box before you rely on the depth."
+            f"{face} The specimen is too short to say how deep a perforation, a cut or a wash "
+            "must reach: lengthen the box."
         )
-    zone = millimetres(damage["zone_depth_m"])
     return (
-        f"{p95} and the first {zone} keep {share}, so a perforation, a cut or a wash that reaches "
-        f"deeper than {zone} meets sand that lost less than {limit}."
+        f"{face} Let a perforation, a cut or a wash reach deeper than {millimetres(beyond)}: that "
+        "is this depth with two standard deviations of seeds."
     )
 
 
@@ -211,10 +220,9 @@ def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
     scatter = summary.get("scatter")
     if scatter and summary.get("invaded_count"):
         yield (
-            f"This is one run with one seed ({summary['seed']}). Repeated seeds of such "
-            f"specimens differ by {two_digits(scatter['depth_p95_relative'])} in the depth and by "
-            f"{100 * scatter['first_mm_loss']:.2g} points in the loss of the first millimetre "
-            f"(one standard deviation, {scatter['runs']} runs; {scatter['source']})."
+            f"This is one run with one seed ({summary['seed']}); the ± are one standard deviation "
+            f"of {scatter['runs']} runs ({scatter['source']}). `fdnet ensemble CASE --seeds 8` "
+            "gives the band of your own case."
         )
 
 

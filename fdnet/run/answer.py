@@ -37,6 +37,8 @@ class Step(NamedTuple):
 # How deep the damage reaches and how much permeability is left there.
 
 
+FACE = 1e-3
+"""m; depth behind the face whose loss stands first in an answer."""
 DAMAGED_FROM = 0.05
 """Share of its permeability that a layer must have lost to count as damaged."""
 _TOUCH = 1e-9
@@ -115,6 +117,22 @@ def zone_of(steps: Sequence[Step]) -> Zone:
     after = layers_in_series([(one.far - one.near, one.after) for one in inside])
     ratio = after / before if before > 0 else 0.0
     return Zone(inside[-1].far, ratio, before, after, len(inside) == len(steps))
+
+
+def face_loss(steps: Sequence[Step], depth: float = FACE) -> tuple[float, float]:
+    """Share of its permeability that the sand lost from the face to `depth` m, and that depth.
+
+    Layers in series; the depth is at most that of the specimen.
+    """
+    inside = [one for one in steps if one.near < depth]
+    ends = [min(one.far, depth) for one in inside]
+    before, after = (
+        layers_in_series(
+            [(end - one.near, getattr(one, k)) for one, end in zip(inside, ends, strict=True)]
+        )
+        for k in ("before", "after")
+    )
+    return (1.0 - after / before if before > 0 else 0.0), ends[-1]
 
 
 def layers_in_series(layers: Sequence[tuple[float, float]]) -> float:
@@ -314,6 +332,14 @@ QUICK = Scatter(
     source=f"quick specimens 1, 2, 4, 5, 7 and 8 of {SOURCE}",
 )
 """Specimens of 110 grains, 3 grains wide."""
+FOLLOWED = Scatter(
+    depth=0.36,
+    loss=0.01,
+    runs=16,
+    cases=("quick", "well"),
+    source="eight seeds each of cases/quick.toml and cases/well.toml",
+)
+"""Specimens of some 250 grains in a flow that follows the deposit (docs/validation/seeds.csv)."""
 FULL = Scatter(
     depth=0.42,
     loss=0.019,
@@ -351,6 +377,8 @@ def with_answer(
             "lost_from": DAMAGED_FROM,
             "reaches_the_end": zone.open_end,
         }
+        lost, face = face_loss(steps)
+        result["damage"] |= {"face_depth_m": face, "face_lost": lost}
         if case.well is not None:
             radius, drainage = case.well.radius_m, case.well.drainage_radius_m
             skin = layered_skin(steps, radius)
@@ -358,6 +386,7 @@ def with_answer(
             result["skin_flow_lost"] = flow_lost(skin, well=radius, drainage=drainage)
             result["skin_well_radius_m"] = radius
         scatter = QUICK if len(spheres.grains()) < QUICK_GRAINS else FULL
+        scatter = FOLLOWED if case.drag.coupled else scatter
         result["scatter"] = {
             "depth_p95_relative": scatter.depth,
             "first_mm_loss": scatter.loss,

@@ -12,10 +12,12 @@ from scipy.integrate import solve_ivp
 from fdnet.report.tables import in_millidarcy, millidarcy, percent
 from fdnet.report.text import answer_sentence, facts, in_place_words
 from fdnet.run.answer import (
+    FOLLOWED,
     FULL,
     QUICK,
     BridgingSizes,
     Step,
+    face_loss,
     flow_lost,
     hawkins,
     layered_skin,
@@ -202,6 +204,20 @@ def test_the_scatter_of_a_seed_is_that_of_the_published_repeats(root):
         assert seeds.size().sum() == one.runs
         assert one.depth == pytest.approx(((depth.std() / depth.mean()) ** 2).mean() ** 0.5, 0.02)
         assert one.loss == pytest.approx((loss.std() ** 2).mean() ** 0.5, 0.03)
+    seeds = pd.read_csv(root / "docs/validation/seeds.csv").groupby("case")
+    assert dict(seeds.size()) == dict.fromkeys(FOLLOWED.cases, FOLLOWED.runs // 2)
+    depth, loss = seeds["invasion_depth_p95_m"], seeds["face_lost"]
+    spread = ((depth.std() / depth.mean()) ** 2).mean() ** 0.5
+    assert FOLLOWED.depth == pytest.approx(spread, 0.02)
+    assert FOLLOWED.loss == pytest.approx((loss.var()).mean() ** 0.5, 0.03)
+
+
+def test_the_loss_at_the_face_is_that_of_the_layers_in_series():
+    """1.5 of 2 layers, and a depth beyond the end."""
+    steps = [step(0.0, 1e-3, 2.0, 0.5), step(1e-3, 3e-3, 4.0, 2.0)]
+    before, after = 1.0 / (1 / 2 + 0.5 / 4), 1.0 / (1 / 0.5 + 0.5 / 2)
+    assert face_loss(steps, 1.5e-3) == (pytest.approx(1 - after / before), 1.5e-3)
+    assert face_loss(steps[:1], 1.5e-3) == (pytest.approx(0.75), 1e-3)
 
 
 SUMMARY = {
@@ -219,14 +235,17 @@ SUMMARY = {
         "zone_k_over_k0": 0.34,
         "reaches_the_end": False,
         "lost_from": 0.05,
+        "face_depth_m": 1e-3,
+        "face_lost": 0.784,
     },
+    "sections": [{"x_hi_m": 4e-3}],
     "scatter": {"depth_p95_relative": 0.36, "first_mm_loss": 0.067, "runs": 30, "source": "x.csv"},
 }
 
 WELL = {"skin": 0.056, "skin_flow_lost": 0.0081, "skin_well_radius_m": 0.108}
 
 
-FOLLOWED = {"drag_last_update": {"k_over_k0": 0.278}, "damage_law_used": "thesis"}
+FLOW = {"drag_last_update": {"k_over_k0": 0.278}, "damage_law_used": "thesis"}
 
 
 def test_each_number_of_two_laws_names_its_own():
@@ -234,7 +253,7 @@ def test_each_number_of_two_laws_names_its_own():
     counts = dict.fromkeys(("supplied_count", "passed_count", "upstream_count"), 900)
     more = {"k_damaged_m2": 1.466e-12, "k_reduction": 0.267, "porosity_damaged": 0.3}
     more |= {"invasion_depth_m": 2e-3, "cake_thickness_m": 0.0, "law": "thesis", **counts}
-    said = {one.name: one.text for one in facts(SUMMARY | more | FOLLOWED)}
+    said = {one.name: one.text for one in facts(SUMMARY | more | FLOW)}
     assert said["permeability"].endswith("26.7 % lost by the law thesis")
     assert said["flow"].startswith("72.2 % lost as the flow met it last: by section-archie with")
     assert "flow" not in {one.name for one in facts(SUMMARY | more | {"damage_law": "thesis"})}
@@ -242,7 +261,12 @@ def test_each_number_of_two_laws_names_its_own():
 
 def test_the_answer_is_a_sentence_to_act_on():
     for changed, said, not_said in [
-        ({}, ["within 1.39 mm", "keep 34 %", "deeper than 2 mm", "less than 5 %"], "skin"),
+        (
+            {},
+            ["first 1 mm lost 78 %", "± 6.7 points", "within 1.39 mm (± 36 %)", "than 2.39 mm"],
+            "skin",
+        ),
+        ({"sections": [{"x_hi_m": 2.3e-3}]}, ["too short", "lengthen the box"], "deeper"),
         (WELL, ["small skin of 0.056", "0.81 % of the flow", "108 mm"], "infinite"),
         (WELL | {"skin": None, "skin_flow_lost": 1.0}, ["skin is infinite"], "small"),
         (WELL | {"skin": -1e-4, "skin_flow_lost": -1e-5}, ["this is no skin"], "-"),
@@ -252,7 +276,7 @@ def test_the_answer_is_a_sentence_to_act_on():
             ["mud was cut off", "fines.slab_mm"],
             "cap",
         ),
-        (FOLLOWED, ["keep 34 % of the permeability (by the law thesis)"], "all-spheres"),
+        (FLOW, ["lost 78 % of the permeability by the law thesis"], "all-spheres"),
         ({"invaded_count": 0}, ["No fine entered"], "95 %"),
     ]:
         with naming(changed, said, not_said):
