@@ -280,7 +280,7 @@ def _run(options: argparse.Namespace) -> int:
         )
     summary = run_stages(case, chosen)
     for text in summary.get("warnings", []):
-        if text.endswith(f"{PAGE}#no-picture)"):
+        if text.endswith((f"{PAGE}#no-picture)", f"{PAGE}#no-view)")):
             _warn(text)
     if options.json:
         print(json.dumps(summary, indent=2))

@@ -7,6 +7,7 @@ input.
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -105,7 +106,7 @@ def draw_frames(
     if done.returncode:
         printed = [line.strip() for line in (done.stderr or "").splitlines() if line.strip()]
         kind = "exit code" if done.returncode > 0 else "signal"
-        why = printed[-1][:200] if printed else "no usable OpenGL?"
+        why = re.sub(r".*\|\s*", "", printed[-1])[:200] if printed else "no usable OpenGL?"
         raise OSError(f"the drawing process ended with {kind} {abs(done.returncode)}; {why}")
     for target in targets:
         picture = target.read_bytes() if target.is_file() else b""
@@ -162,8 +163,8 @@ def write_movie(
             late = isinstance(error, subprocess.TimeoutExpired)
             reason = f"the drawing was given up after {seconds:g} s" if late else str(error)
             raise CaseError(
-                f"{target}: not drawn, because {reason}; the set-up installs software OpenGL, and "
-                "invasion.pvd opens in ParaView without it"
+                f"{target}: not drawn, because {reason}; install software OpenGL "
+                "(docs/start/install.md), or open invasion.pvd in ParaView"
             ) from error
         pairs = zip(files, frames, strict=True)
         pictures = [_worded(file, frame.words, above=still) for file, frame in pairs]

@@ -18,7 +18,12 @@ from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.network.specimen import cake_of
 from fdnet.report.picture import MovieFrame, Scene, refuse_suffix, write_movie
-from fdnet.report.vtk import write_flux_vtp, write_lines_vtp, write_spheres_vtp
+from fdnet.report.vtk import (
+    refuse_without_view,
+    write_flux_vtp,
+    write_lines_vtp,
+    write_spheres_vtp,
+)
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import ANALYSE_AGAIN, check_finished, check_one, frames_in, frames_of
 from fdnet.spheres.geometry import wrapped
@@ -193,7 +198,7 @@ def movie_of(
     `target` ends in .gif or .mp4 and is invasion.gif in the run folder without it. With .png it is
     one picture of the specimen before and after. `show` is a key of `SHOWN`. Raises CaseError
     where the folder is no finished run with fines and frames, one of its files was changed, a
-    file is there that `force` does not allow to replace, or nothing can be drawn.
+    file is there that `force` does not allow to replace, VTK is missing, or nothing can be drawn.
     """
     if not LEAST <= per_second <= MOST:
         raise CaseError(f"--fps: {per_second:g}, expected {LEAST:g} to {MOST:g} frames a second")
@@ -203,6 +208,7 @@ def movie_of(
     path = target or run.path / "invasion.gif"
     refuse_suffix(path)
     refuse_present(path, force=force)
+    refuse_without_view(str(path))
     check_finished(folder)
     moments = list(moments_of(run))
     if path.suffix.lower() == ".png":

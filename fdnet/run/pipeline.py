@@ -288,9 +288,9 @@ def _analyse_and_report(session: Session, pack: dict[str, Any]) -> dict[str, Any
     session.options.answered(summary)
     if "report" in session.options.stages:
         with session.timed("report"):
-            write_paraview(results)
-            figures, notes = draw_figures(results)
-        summary["warnings"] += [explained(note) for note in notes]
+            lacking = write_paraview(results)
+            figures, notes = draw_figures(results, solid=not lacking)
+        summary["warnings"] += [explained(note) for note in lacking + notes]
         summary["seconds"] |= {"report": session.seconds["report"]}
         summary |= stage_costs(stages, session.cpu_seconds)
         tables.write_summary(session.path / "summary.json", summary)
