@@ -99,7 +99,7 @@ def test_commands_on_pages_are_ones_that_fdnet_takes():
         for line in (re.sub(r"(^|\s)#.*", "", line) for line in lines):
             match = re.search(r"(?:^|[\s/])fdnet (.*?)(?:[|>;]|$)", line)
             try:
-                _parser().parse_args(shlex.split(match[1]) if match else ["cases"])
+                _parser().parse_args(shlex.split(match[1]) if match else ["init"])
             except SystemExit as error:
                 bad += [] if error.code == 0 else [f"{name}: {line}"]
     assert not bad, "\n".join(bad)
