@@ -94,5 +94,6 @@ def test_strict_ends_with_2_where_anything_is_odd(root, capsys):
     assert main(["check", case, "--strict"]) == 2
     strict = capsys.readouterr()
     assert strict.out == said.out
-    assert "--strict:" in strict.err and not said.err
+    assert "--strict:" in strict.err
+    assert not said.err
     assert main(["check", str(root / "cases" / "quick.toml"), "--strict"]) == 0
