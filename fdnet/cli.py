@@ -17,15 +17,13 @@ from typing import Any, NoReturn
 
 from fdnet.commands import campaign, finished, init, mechanics, permeability, run
 from fdnet.commands.options import Parser, meant
-from fdnet.commands.permeability import joined_box
 from fdnet.errors import FdnetError, words_of
 
 COMMANDS = (
-    *(run.add_run, init.add_init, run.add_check, permeability.add_permeability),
-    *(finished.add_stokes, mechanics.add_mechanics, campaign.add_ensemble, campaign.add_sweep),
-    *(campaign.add_compare, finished.add_movie, run.add_render),
+    *(init.add_init, run.add_case_commands, permeability.add_permeability),
+    *(finished.add_commands_on_runs, mechanics.add_mechanics, campaign.add_campaign_commands),
 )
-"""What adds each command to the parser, in the order that `fdnet --help` shows."""
+"""What adds commands to the parser, in the order that `fdnet --help` shows."""
 FORMER = {
     "cases": "fdnet init --list, and fdnet init --from CASE",
     "design": "fdnet sweep, which takes the same file",
@@ -132,15 +130,12 @@ def _parsed(given: Sequence[str]) -> argparse.Namespace:
     parser = _parser()
     known = commands_of(parser)
     name = next((one for one in given if not one.startswith("-")), None)
-    if not given:
-        parser.print_help()
-        parser.exit(0)
     if name in FORMER:
         parser.exit(2, f"fdnet: {name} is gone; use {FORMER[name]}\n")
     if name is not None and name not in known:
         near = f"; did you mean run {name}?" if name.endswith(".toml") else meant(name, known)
         parser.error(f"{name}: is no command{near}")
-    options, unknown = parser.parse_known_args(joined_box(given))
+    options, unknown = parser.parse_known_args(given)
     if unknown:
         options.parser.refuse(unknown)
     return options
@@ -154,17 +149,29 @@ def _parser() -> Parser:
         "fdnet COMMAND --help explains a command.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
-    parser.add_argument(
-        "--completion",
-        action=_Completion,
-        nargs=0,
-        help='print what completes commands, for bash and zsh: eval "$(fdnet --completion)"',
-    )
-    commands = parser.add_subparsers(required=True, metavar="command", title="commands")
+    parser.set_defaults(action=_say, parser=parser)
+    parser.add_argument("--version", action="store_true", help="print the version")
+    words = 'print what completes commands, for bash and zsh: eval "$(fdnet --completion)"'
+    parser.add_argument("--completion", action="store_true", help=words)
+    commands = parser.add_subparsers(metavar="COMMAND", title="commands")
     for add in COMMANDS:
         add(commands)
     return parser
+
+
+def _say(options: argparse.Namespace) -> int:
+    """What `fdnet` says without a command: its version, the script of a shell, or its help."""
+    if options.version:
+        from importlib import metadata
+
+        print(f"fdnet {metadata.version('fdnet')}")
+    elif options.completion:
+        from fdnet.case.file import shipped_cases
+
+        print(completion(commands_of(options.parser), [case.name for case in shipped_cases()]))
+    else:
+        options.parser.print_help()
+    return 0
 
 
 def commands_of(parser: argparse.ArgumentParser) -> dict[str, Parser]:
@@ -172,14 +179,6 @@ def commands_of(parser: argparse.ArgumentParser) -> dict[str, Parser]:
     actions = parser._actions
     (commands,) = (one for one in actions if isinstance(one, argparse._SubParsersAction))
     return dict(commands.choices)
-
-
-class _Completion(argparse.Action):
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        from fdnet.case.file import shipped_cases
-
-        print(completion(commands_of(parser), [case.name for case in shipped_cases()]))
-        parser.exit(0)
 
 
 def completion(commands: Mapping[str, Parser], cases: Sequence[str]) -> str:
@@ -213,14 +212,6 @@ _fdnet() {{
   COMPREPLY=($(compgen -W "$words" -- "$word"))
 }}
 complete -o default -F _fdnet fdnet"""
-
-
-class _Version(argparse.Action):
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        from importlib import metadata
-
-        print(f"fdnet {metadata.version('fdnet')}")
-        parser.exit(0)
 
 
 if __name__ == "__main__":

@@ -6,11 +6,11 @@ import sys
 
 import pytest
 
-from fdnet.cli import COMMANDS, FORMER, _parser, commands_of, main
+from fdnet.cli import FORMER, _parser, commands_of, main
 
 LISTED = (
-    *("run", "init", "check", "permeability", "stokes"),
-    *("mechanics", "ensemble", "sweep", "compare", "movie"),
+    *("init", "run", "check", "permeability", "stokes"),
+    *("movie", "mechanics", "ensemble", "sweep", "compare"),
 )
 
 
@@ -21,13 +21,12 @@ def ended(arguments: list[str]) -> int:
 
 
 def test_fdnet_alone_lists_ten_commands(capsys):
-    assert ended([]) == 0
+    assert main([]) == 0
     alone = capsys.readouterr().out
     assert ended(["--help"]) == 0
     assert capsys.readouterr().out == alone
     assert tuple(re.findall(r"^    (\w+)(?: |$)", alone, re.M)) == LISTED
     assert set(commands_of(_parser())) == {*LISTED, "render"}
-    assert len(COMMANDS) == len(LISTED) + 1
 
 
 def test_every_command_has_a_sentence_an_example_and_options_in_groups(capsys):

@@ -103,8 +103,8 @@ def _run_campaign(
 # The commands.
 
 
-def add_ensemble(commands: Any) -> None:
-    """Adds `fdnet ensemble`: one case with several seeds, and the band of every number."""
+def add_campaign_commands(commands: Any) -> None:
+    """Adds `fdnet ensemble`, `sweep` and `compare` to the command line."""
     about = "run one case with several seeds, and give every number with its 95 % band"
     example = "fdnet ensemble mine.toml --seeds 8 --out runs/mine-8"
     parser = new_command(commands, "ensemble", _run_ensemble, about, example)
@@ -113,16 +113,6 @@ def add_ensemble(commands: Any) -> None:
     parser.add(THE_CASE, "--seeds N", number, int, 4)
     parser.share(*_ENGINE)
 
-
-def _run_ensemble(options: argparse.Namespace) -> int:
-    from fdnet.campaign.plan import ensemble_plan
-
-    plan = ensemble_plan(case_of(options), options.seeds, **_plan_options(options))
-    return _run_campaign(options, plan)
-
-
-def add_sweep(commands: Any) -> None:
-    """Adds `fdnet sweep`: every combination of keys, variants, cases and seeds of a file."""
     about = "run and compare the cases and seeds of a file, and rank them by its targets"
     example = "fdnet sweep cases/sweeps/bridging.toml --out runs/bridging"
     parser = new_command(commands, "sweep", _run_sweep, about, example)
@@ -130,17 +120,6 @@ def add_sweep(commands: Any) -> None:
     parser.add(THE_CASE, "sweep SWEEP.toml", file, path_option)
     parser.share(*_ENGINE)
 
-
-def _run_sweep(options: argparse.Namespace) -> int:
-    from fdnet.campaign.plan import sweep_plan
-    from fdnet.campaign.result import read_targets
-
-    plan = sweep_plan(options.sweep, **_plan_options(options))
-    return _run_campaign(options, plan, read_targets(plan.targets))
-
-
-def add_compare(commands: Any) -> None:
-    """Adds `fdnet compare`: finished runs, grouped by what differs in their cases."""
     about = "compare finished runs, with 95 % bands over seeds"
     example = "fdnet compare runs/thin runs/thick --out runs/compared"
     parser = new_command(commands, "compare", _run_compare, about, example)
@@ -150,6 +129,21 @@ def add_compare(commands: Any) -> None:
     )
     parser.add(THE_CASE, "runs RUN", folders, path_option, nargs="+")
     parser.share("--out", "--rank-by", "--json")
+
+
+def _run_ensemble(options: argparse.Namespace) -> int:
+    from fdnet.campaign.plan import ensemble_plan
+
+    plan = ensemble_plan(case_of(options), options.seeds, **_plan_options(options))
+    return _run_campaign(options, plan)
+
+
+def _run_sweep(options: argparse.Namespace) -> int:
+    from fdnet.campaign.plan import sweep_plan
+    from fdnet.campaign.result import read_targets
+
+    plan = sweep_plan(options.sweep, **_plan_options(options))
+    return _run_campaign(options, plan, read_targets(plan.targets))
 
 
 def _run_compare(options: argparse.Namespace) -> int:

@@ -9,12 +9,18 @@ from typing import Any
 from fdnet.commands.options import OUTPUT, THE_FLOW, THE_PICTURE, new_command
 from fdnet.files import path_option
 
-# ------------------------------------------------------------------------------------------------
-# `fdnet movie`: the invasion of a finished run.
 
+def add_commands_on_runs(commands: Any) -> None:
+    """Adds `fdnet stokes` and `movie` to the command line."""
+    about = "compute sections of a finished run by resolved flow, to check the network"
+    parser = new_command(commands, "stokes", _stokes, about, "fdnet stokes runs/mine --section 2")
+    parser.add(THE_FLOW, "run RUN", "run folder", path_option)
+    number = "number of a section, 1 at the face (default 1); may be given again"
+    parser.add(THE_FLOW, "--section N", number, int, action="append")
+    cells = "cells across the mean radius of a fine, on the finer of two grids (default 3.5)"
+    parser.add(THE_FLOW, "--across CELLS", cells, float)
+    parser.share("--json", "--quiet")
 
-def add_movie(commands: Any) -> None:
-    """Adds the command to the command line."""
     about = "draw the invasion of a finished run as a movie, or a picture of before and after"
     movie = new_command(commands, "movie", _movie, about, "fdnet movie runs/mine --show flux")
     movie.add(OUTPUT, "run RUN", "run folder", path_option)
@@ -46,22 +52,6 @@ def _movie(options: argparse.Namespace) -> int:
     )
     print(f"{'picture' if path.suffix.lower() == '.png' else 'movie'}: {path}")
     return 0
-
-
-# ------------------------------------------------------------------------------------------------
-# `fdnet stokes`: sections of a finished run by resolved Stokes flow.
-
-
-def add_stokes(commands: Any) -> None:
-    """Adds the command to the command line."""
-    about = "compute sections of a finished run by resolved flow, to check the network"
-    parser = new_command(commands, "stokes", _stokes, about, "fdnet stokes runs/mine --section 2")
-    parser.add(THE_FLOW, "run RUN", "run folder", path_option)
-    number = "number of a section, 1 at the face (default 1); may be given again"
-    parser.add(THE_FLOW, "--section N", number, int, action="append")
-    cells = "cells across the mean radius of a fine, on the finer of two grids (default 3.5)"
-    parser.add(THE_FLOW, "--across CELLS", cells, float)
-    parser.share("--json", "--quiet")
 
 
 def _stokes(options: argparse.Namespace) -> int:

@@ -1,8 +1,10 @@
 """`fdnet permeability`: the permeability of spheres in a file, without LIGGGHTS."""
 
 import argparse
+import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,13 +40,8 @@ def add_permeability(commands: Any) -> None:
     about = "compute the permeability of a file of spheres, without LIGGGHTS"
     example = "fdnet permeability spheres.csv --units mm --box 0,4,0,4,0,4 --periodic xyz"
     parser = new_command(commands, "permeability", run, about, example)
-
-    def spheres(spec: str, text: str, kind: Any = None, **more: Any) -> None:
-        parser.add(THE_SPHERES, spec, text, kind, **more)
-
-    def flow(spec: str, text: str, kind: Any = None, default: Any = None, **more: Any) -> None:
-        parser.add(THE_FLOW, spec, text, kind, default, **more)
-
+    parser._negative_number_matcher = re.compile(r"-[\d.][-+\d.,eE]*$")  # --box -1,1,... too
+    spheres, flow = partial(parser.add, THE_SPHERES), partial(parser.add, THE_FLOW)
     spheres(
         "spheres SPHERES",
         "text (columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]), LIGGGHTS or LAMMPS text "
@@ -92,20 +89,6 @@ def add_permeability(commands: Any) -> None:
     flow("--compare-laws", "all laws with all damage laws as a table")
     parser.add(OUTPUT, "--csv FILE", "write the laws, one row each, as CSV", path_option)
     parser.share("--json")
-
-
-def joined_box(arguments: Sequence[str]) -> list[str]:
-    """The arguments with `--box -1,1,...` as `--box=-1,1,...`.
-
-    argparse takes a separate value that begins with a minus sign for an option.
-    """
-    result: list[str] = []
-    for argument in arguments:
-        if result and result[-1] == "--box" and argument[:1] == "-" and "," in argument:
-            result[-1] = f"--box={argument}"
-        else:
-            result.append(argument)
-    return result
 
 
 def _count(text: str) -> int:

@@ -16,16 +16,40 @@ if TYPE_CHECKING:
     from fdnet.scales.check import Checked
 
 
-# ------------------------------------------------------------------------------------------------
-# `fdnet check`: what is odd about a case, what to do about it, and what the run takes.
+def add_case_commands(commands: Any) -> None:
+    """Adds `fdnet run`, `check` and `render` to the command line."""
+    about = "pack the sand, let fines invade it, give the permeability before and after"
+    example = "fdnet run mine.toml --out runs/mine --set fines.count=500"
+    run = new_command(
+        commands,
+        "run",
+        _run,
+        about,
+        example,
+        f"{example} --resume",
+        "fdnet render mine.toml --out decks    # --dry-run that writes the LIGGGHTS decks too",
+    )
+    run.share("case", "--seed", "--set", "--np", "--liggghts", "--launcher", "--timeout")
+    pack = "take the finished pack of this run folder, made of the same grains and seed"
+    run.add(LIGGGHTS, "--pack-from RUN", pack, path_option)
+    run.add(OUTPUT, "--out DIR", "run folder (default runs/NAME)", path_option)
+    run.add(OUTPUT, "--resume", "continue an unfinished run")
+    run.share("--force", "--stages", "--json", "--quiet")
+    dry = "run and write nothing; print velocities, time steps and what is odd"
+    run.add(OUTPUT, "--dry-run", dry)
 
-
-def add_check(commands: Any) -> None:
-    """Adds the command to the command line."""
     about = "say what is odd about a case, what to do about it, and what the run takes"
     check = new_command(commands, "check", _check, about, "fdnet check mine.toml --strict")
     check.share("case", "--seed", "--set", "--np", "--json")
     check.add(OUTPUT, "--strict", "end with exit code 2 where anything is odd")
+
+    about = "write the LIGGGHTS decks, and print what fdnet run --dry-run prints"
+    render = new_command(commands, "render", _render, about, "fdnet render mine.toml --out decks")
+    render.share("case", "--seed", "--set", "--np", "--out")
+
+
+# ------------------------------------------------------------------------------------------------
+# `fdnet check`: what is odd about a case, what to do about it, and what the run takes.
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -55,13 +79,6 @@ def _refuse_refused(result: "Checked") -> None:
 
 # ------------------------------------------------------------------------------------------------
 # `fdnet run --dry-run` prints the scales; `fdnet render` writes the decks too.
-
-
-def add_render(commands: Any) -> None:
-    """Adds the command to the command line."""
-    about = "write the LIGGGHTS decks, and print what fdnet run --dry-run prints"
-    render = new_command(commands, "render", _render, about, "fdnet render mine.toml --out decks")
-    render.share("case", "--seed", "--set", "--np", "--out")
 
 
 def _render(options: argparse.Namespace) -> int:
@@ -97,29 +114,6 @@ def _print_scales(case: Any) -> "Checked":
 
 # ------------------------------------------------------------------------------------------------
 # `fdnet run`: pack, invade, analyse and report one case.
-
-
-def add_run(commands: Any) -> None:
-    """Adds the command to the command line."""
-    about = "pack the sand, let fines invade it, give the permeability before and after"
-    example = "fdnet run mine.toml --out runs/mine --set fines.count=500"
-    run = new_command(
-        commands,
-        "run",
-        _run,
-        about,
-        example,
-        f"{example} --resume",
-        "fdnet render mine.toml --out decks    # --dry-run that writes the LIGGGHTS decks too",
-    )
-    run.share("case", "--seed", "--set", "--np", "--liggghts", "--launcher", "--timeout")
-    pack = "take the finished pack of this run folder, made of the same grains and seed"
-    run.add(LIGGGHTS, "--pack-from RUN", pack, path_option)
-    run.add(OUTPUT, "--out DIR", "run folder (default runs/NAME)", path_option)
-    run.add(OUTPUT, "--resume", "continue an unfinished run")
-    run.share("--force", "--stages", "--json", "--quiet")
-    dry = "run and write nothing; print velocities, time steps and what is odd"
-    run.add(OUTPUT, "--dry-run", dry)
 
 
 def _run(options: argparse.Namespace) -> int:
