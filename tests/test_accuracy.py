@@ -31,7 +31,7 @@ def test_laws_on_a_slab():
 
 
 def test_a_fine_that_vanishes_changes_nothing():
-    """Without the fourth sphere and those around a section the mean is 1 % too high."""
+    """Without the spheres around a section the mean is 1 % too high."""
     pack = truth.read_pack("packH_r5_d1")
     grains, places, size = pack.grains(), pack.fines().position[::3], pack.box[0, 1]
     k0, changes = by_all_spheres(grains)[0], []

@@ -77,8 +77,8 @@ class Case(Part):
     Examples:
         >>> import fdnet
         >>> case = fdnet.read_case("cases/quick.toml")
-        >>> isinstance(case, fdnet.Case), case.grains.radius_mm
-        (True, 0.25)
+        >>> isinstance(case, fdnet.Case), case.name
+        (True, 'quick')
         >>> case.digest() == fdnet.read_case("cases/quick.toml").digest()
         True
     """
@@ -209,8 +209,8 @@ class InvasionCase(Case):
 
     Examples:
         >>> import fdnet
-        >>> case = fdnet.read_case("cases/quick.toml", assignments=["fines.radius_mm=0.05"])
-        >>> isinstance(case, fdnet.InvasionCase), case.fines.radius_mm
+        >>> case = fdnet.read_case("cases/quick.toml", assignments=["fines.concentration=0.05"])
+        >>> isinstance(case, fdnet.InvasionCase), case.fines.concentration
         (True, 0.05)
     """
 

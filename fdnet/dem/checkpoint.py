@@ -440,18 +440,23 @@ def time_of(row: Checkpoint, scales: InvasionScales) -> float:
 
 RAISE_ABOVE, RAISE_TO, MOST_RAISE = 0.67, 0.6, 2.0
 """Shares of `PRESSED`: springs are stiffened at a checkpoint when the overlap that lasted in the
-chunk before was above the first, so that it would have been the second. At most so many times the
-steps at once."""
+chunk before was above the first and more than before, so that it would have been the second. At
+most so many times the steps at once. A fine that is wedged between grains keeps its overlap with
+stiffer springs too."""
 
 
-def steps_after(case: InvasionCase, steps: int, seen: Sequence[float]) -> int:
-    """Steps of the chunk after one of `steps` steps, in which these largest overlaps were `seen`.
+def lasting_overlap(seen: Sequence[float]) -> float:
+    """The overlap that one in ten of those `seen` exceeds at the most: an impact is no load."""
+    return sorted(seen)[math.ceil(9 * (len(seen) - 1) / 10)]
 
-    One overlap in ten may be larger: a single impact is no load. An overlap goes with the
-    stiffness k to the power -1 (Hertz -2/3), the step with k to -1/2.
+
+def steps_after(case: InvasionCase, steps: int, overlap: float, before: float = 0.0) -> int:
+    """Steps of the chunk after one of `steps` steps with an `overlap` that lasted.
+
+    In the chunk `before` it was another. It goes with the stiffness k to the power -1 (Hertz
+    -2/3), the step with k to -1/2.
     """
-    overlap = sorted(seen)[math.ceil(9 * (len(seen) - 1) / 10)]
-    if not rises(case) or overlap <= RAISE_ABOVE * PRESSED:
+    if not rises(case) or overlap <= max(before, RAISE_ABOVE * PRESSED):
         return steps
     power = 0.75 if case.contact.model == "hertz" else 0.5
     return math.ceil(steps * min(MOST_RAISE, (overlap / (RAISE_TO * PRESSED)) ** power))

@@ -31,8 +31,10 @@ from fdnet.dem.checkpoint import (
     entered_by,
     flow_says,
     is_watched,
+    lasting_overlap,
     overlap_in,
     overlap_text,
+    plug_allowance,
     quiet_chunks,
     quiet_enough,
     read_history,
@@ -374,14 +376,20 @@ class InvadeStage(ChunkedStage):
         case, scales = self.case, self.scales
         if last is None or not rises(case):
             return scales
-        rows = read_rows(self.folder)
-        begun = max((row.step for row in rows if row.step < last.step), default=0)
-        watched = (one for one in read_watch(self.folder) if begun < one.step <= last.step)
-        seen = [one.fraction for one in watched]
-        if not seen:
-            state = state_at(self.folder, last, case, scales, self.grains)
-            seen.append(overlap_in(case, state).fraction)
-        return stiffened(case, scales, steps_after(case, last.step - begun, seen))
+        earlier = [one for one in read_rows(self.folder) if one.chunk < last.chunk]
+        begun = [0, 0, *(one.step for one in earlier)][-2:]
+        watched = read_watch(self.folder)
+
+        def lasting(first: int, row: Checkpoint) -> float:
+            seen = [one.fraction for one in watched if first < one.step <= row.step]
+            if not seen:
+                state = state_at(self.folder, row, case, scales, self.grains)
+                seen.append(overlap_in(case, state).fraction)
+            return lasting_overlap(seen)
+
+        before = lasting(begun[0], earlier[-1]) if earlier else 0.0
+        seen = lasting(begun[1], last)
+        return stiffened(case, scales, steps_after(case, last.step - begun[1], seen, before))
 
     def look_at(self, history: Sequence[Checkpoint], overlaps: Sequence[Deepest]) -> None:
         """Raise LiggghtsError when a fine overlapped too much and `run.on_overlap` is "stop".
@@ -468,7 +476,7 @@ class InvadeStage(ChunkedStage):
                 )
             )
         before = history[-min(len(history), quiet_chunks(scales) + 1)]
-        if reason == "plugged" and last.passed > before.passed:
+        if reason == "plugged" and last.passed - before.passed > plug_allowance(case, scales):
             warnings.append(
                 Doubt(
                     "still-leaving",

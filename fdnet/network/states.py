@@ -235,7 +235,7 @@ def state_slabs(
 # The damaged permeability from the network of all spheres, grains and fines alike.
 #
 # The power tessellation of grains and fines gives pores and throats at the scale of the fines, and
-# the law `lubrication` gives their conductance, narrowed where a fourth sphere reaches into a
+# the law `lubrication` gives their conductance, narrowed where no sphere of a facet reaches a
 # section. No damage law is needed. Fines centred upstream whose bodies reach into the specimen
 # count with what they have inside, as grains do.
 

@@ -409,7 +409,8 @@ def deposit_pressure(case: InvasionCase, flow: Velocity, porosity: float) -> flo
 
     h their volume a unit of face, d their Sauter diameter, e = `RANDOM_CLOSE`. On the way w the
     overbalance leaves them p (L + r) / (w + r), and a constant rate p (L + r) / w. A rate that
-    may fall to the share s (`run.stop_rate`) lets r grow to w (1 / s - 1).
+    may fall to the share s (`run.stop_rate`) lets r grow to w (1 / s - 1). Mud that comes until
+    the stop rule brings what is ample to plug the face (`PLUG_SOLIDS`).
     """
     run, fines, length = case.run, case.fines, case.size_m[0]
     pressure = driving_pressure(case, flow.pressure_gradient)
@@ -420,6 +421,8 @@ def deposit_pressure(case: InvasionCase, flow: Velocity, porosity: float) -> flo
         way = inside + (way - inside) * flow.permeability / (given or flow.permeability)
     throat = 2 * fines.radius_range_m[1] / throat_width(porosity, flow.permeability)
     mud = [slab_of(case, throat).length]
+    if fines.endless:
+        mud.append(PLUG_SOLIDS * case.grains.curve.size_at(0.5) / fines.placed_fraction)
     lasts = run.duration_s or run.cap_s
     mud += [] if lasts is None else [lasts * flow.darcy]
     mud += [] if run.stop_pore_volumes is None else [run.stop_pore_volumes * porosity * length]

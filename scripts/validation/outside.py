@@ -92,6 +92,8 @@ def case_of(stiffness: float, *settings: str, fine: float = FINE) -> InvasionCas
         "grains": {"radius_mm": 2e3 * fine, "count": 2},
         "fines": {"radius_mm": 1e3 * fine, "count": 1, "density_kg_m3": DENSITY},
         "fluid": {"velocity_m_s": 1e-3, "viscosity_cP": 1e3 * VISCOSITY},
+        "drag": {"field": "uniform"},
+        "contact": {"restitution": "dry"},
         "run": {"stiffness_N_m": stiffness},
     }
     both = [f"{kind}.{part}" for kind in ("grains", "fines") for part in parts]
@@ -468,7 +470,12 @@ def free(trial: Trial) -> Seen:
         "box": {"size_mm": [3.0, 3.0, 3.0], "sides": "periodic"},
         "grains": {"radius_mm": 0.25, "porosity": 0.40},
         "fines": {"radius_mm": 1e3 * FINE, "count": 1, "density_kg_m3": DENSITY},
-        "fluid": {"viscosity_cP": 50 * thin, "density_kg_m3": LIQUID, "velocity_m_s": SPEED},
+        "fluid": {
+            "viscosity_cP": 50 * thin,
+            "density_kg_m3": LIQUID,
+            "velocity_m_s": SPEED,
+            "darcy_law": "darcy",
+        },
         "contact": {"restitution": "dry"},
         "drag": {
             "field": "uniform",

@@ -71,10 +71,10 @@ def test_grains_alone_keep_the_law_of_grains_and_fines_are_marked(pack, network)
     grains = build_network(pack.grains(), periodic="yz")
     assert not grains.image_fine.any()
     assert not bounded_by_fines(grains).any()
-    assert np.array_equal(deposit_resistances(grains), half_resistances(grains, fourth=True))
+    assert np.array_equal(deposit_resistances(grains), half_resistances(grains, around=True))
     assert np.array_equal(network.image_fine, (pack.kind == Kind.FINE)[network.image_grain])
     # in a pack with fines those that no fine bounds keep it
-    halves, before = deposit_resistances(network), half_resistances(network, fourth=True)
+    halves, before = deposit_resistances(network), half_resistances(network, around=True)
     bounded = bounded_by_fines(network)
     mixed = deposit.mixed_pores(network)[network.pore_group[network.throat_pores]].any(axis=1)
     assert 0.2 < bounded.mean() < 0.9

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case, set_keys
-from fdnet.dem.checkpoint import chunks_of, steps_after
+from fdnet.dem.checkpoint import chunks_of, lasting_overlap, steps_after
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.supply import batches_of
@@ -106,6 +106,9 @@ def test_a_deposit_bears_its_share_of_the_way():
     assert borne(f"run.duration_ms={1e3 * feeding!r}") == pytest.approx(fed, rel=1e-9)
     volumes = 0.1 * slab_of(case, 1.0).length / (porosity * length)
     assert borne(f"run.stop_pore_volumes={volumes!r}") == pytest.approx(fed, rel=1e-9)
+    ample = fines * 0.6 * 0.5e-3 / solids
+    until = borne("fines={radius_mm=0.05, concentration=0.1}")
+    assert until == pytest.approx(2e6 * (length + ample) / (way + ample), rel=1e-9)
     slower = 2e6 * (length + way * (1 / 0.999 - 1)) / (way / 0.999)
     assert borne("run.stop_rate=0.999") == pytest.approx(slower, rel=1e-9)
     assert deposit_pressure(tiny(*FOLLOWED), velocity_of(tiny(), porosity), porosity) <= 3.5e6
@@ -115,11 +118,12 @@ def test_springs_grow_with_the_square_of_the_steps_of_a_chunk():
     case = tiny(*FOLLOWED, "drag.scheme=implicit", "run.stiffness_N_m=auto")
     scales = invasion_scales(case)
     usual = scales.checkpoint_steps
-    assert steps_after(case, usual, [0.02]) == usual
-    assert steps_after(case, usual, [0.03]) == math.ceil(usual * math.sqrt(1 / 0.6))
-    assert steps_after(case, usual, [0.9]) == 2 * usual
-    assert steps_after(case, usual, [0.9, *[0.02] * 10]) == usual, "an impact is no load"
-    assert steps_after(case, usual, [0.9, 0.9, *[0.02] * 10]) == 2 * usual
+    assert steps_after(case, usual, 0.02) == usual
+    assert steps_after(case, usual, 0.03) == math.ceil(usual * math.sqrt(1 / 0.6))
+    assert steps_after(case, usual, 0.9) == 2 * usual
+    assert steps_after(case, usual, 0.03, 0.03) == usual, "a wedged fine"
+    assert lasting_overlap([0.9, *[0.02] * 10]) == 0.02, "an impact is no load"
+    assert lasting_overlap([0.9, 0.9, *[0.02] * 10]) == 0.9
     assert stiffened(case, scales, usual) is scales
     more = stiffened(case, scales, 2 * usual)
     assert more.checkpoint_steps * more.time_step == pytest.approx(
@@ -133,7 +137,7 @@ def test_springs_grow_with_the_square_of_the_steps_of_a_chunk():
             scales.time_step / before.step_limit, rel=1e-12
         )
     given = tiny(*FOLLOWED, "run.stiffness_N_m=100000")
-    assert steps_after(given, usual, [0.9]) == usual
+    assert steps_after(given, usual, 0.9) == usual
 
 
 def test_one_seed_has_one_pack_whatever_stiffness_the_invasion_takes():

@@ -47,7 +47,7 @@ class Sections(NamedTuple):
 #
 # Each disc keeps what its rays see of the triangle before a line midway to the rim of another disc
 # or the opposite side. The directions of the rays do not change with the radii of the discs, so
-# they are set up once for all sections of a throat. A fourth disc may reach into the triangle.
+# they are set up once for all sections of a throat.
 
 
 RAYS = len(FINE_POINTS)
@@ -60,9 +60,9 @@ class CornerRays(NamedTuple):
     """The rays of the three corners of a triangle."""
 
     corner: Array
-    """(3, 4): the angle rad, and the distances m to the next two corners and to a fourth disc."""
+    """(3, 3): the angle rad, and the distances m to the next two corners."""
     ray: Array
-    """(3, 4, 12): the far side m, and the cosines of the angles to these three."""
+    """(3, 3, 12): the far side m, and the cosines of the angles to these two."""
     reach: Array
     """(3, 12) m, where the rays end."""
     part: Array
@@ -72,8 +72,8 @@ class CornerRays(NamedTuple):
 def corner_rays() -> CornerRays:
     """Room for the rays of a section."""
     return CornerRays(
-        corner=np.empty((3, 4)),
-        ray=np.empty((3, 4, RAYS)),
+        corner=np.empty((3, 3)),
+        ray=np.empty((3, 3, RAYS)),
         reach=np.empty((3, RAYS)),
         part=np.empty(RAYS),
     )
@@ -102,48 +102,18 @@ def aim_corners(base: Array, rays: CornerRays) -> None:
 
 
 @loops_inside
-def aim_at_fourth(base: Array, x: float, y: float, rays: CornerRays) -> None:
-    """Sets up the angles to a fourth disc centred at `x`, `y` m, after `aim_corners`."""
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        jx, jy = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
-        kx, ky = base[k, 0] - base[i, 0], base[k, 1] - base[i, 1]
-        qx, qy = x - base[i, 0], y - base[i, 1]
-        aj, aq = rays.corner[i, 1], np.sqrt(qx * qx + qy * qy)
-        sense = 1.0 if jx * ky - jy * kx > 0.0 else -1.0
-        along, across = 1.0, 0.0
-        if aq > 0.0:
-            along = (jx * qx + jy * qy) / (aj * aq)
-            across = sense * (jx * qy - jy * qx) / (aj * aq)
-        rays.corner[i, 3] = aq
-        to_q = rays.ray[i, 3]
-        for p in range(len(to_q)):
-            turn = 0.5 * rays.corner[i, 0] * (1.0 + FINE_POINTS[p]) - QUARTER
-            to_q[p] = cosine_of(turn) * across - sine_of(turn) * along
-
-
-@loops_inside
-def corner_flux(rays: CornerRays, disc: Array, fourth: float, table: Array) -> float:
-    """Flux m4 on the rays from discs of the radii `disc` (3,) m to the lines midway.
-
-    `fourth` m is the radius of a disc that `aim_at_fourth` has set up, or negative without one.
-    """
+def corner_flux(rays: CornerRays, disc: Array, table: Array) -> float:
+    """Flux m4 on the rays from discs of the radii `disc` (3,) m to the lines midway."""
     total, part = 0.0, rays.part
     for i in range(3):
         corner, ray, reach = rays.corner[i], rays.ray[i], rays.reach[i]
-        far, to_j, to_k, to_q = ray[0], ray[1], ray[2], ray[3]
-        aj, ak, aq = corner[1], corner[2], corner[3]
+        far, to_j, to_k = ray[0], ray[1], ray[2]
+        aj, ak = corner[1], corner[2]
         ej, ek = disc[(i + 1) % 3] - disc[i], disc[(i + 2) % 3] - disc[i]
         half_j, half_k = 0.5 * (aj * aj - ej * ej), 0.5 * (ak * ak - ek * ek)
         for p in range(len(reach)):
             before = midway(half_j, aj * to_j[p] + ej), midway(half_k, ak * to_k[p] + ek)
             reach[p] = min(far[p], before[0], before[1])
-        if fourth >= 0.0:
-            wider = fourth - disc[i]
-            half, hidden = 0.5 * (aq * aq - wider * wider), aq <= wider
-            for p in range(len(reach)):
-                end = min(reach[p], midway(half, aq * to_q[p] + wider))
-                reach[p] = 0.0 if hidden else end
         for p in range(len(reach)):
             part[p] = FINE_WEIGHTS[p] * flux_on_ray(reach[p], disc[i])
         flux, nearest = 0.0, np.inf
@@ -375,7 +345,7 @@ def disc_fluxes(
                 if aimed != t:
                     aim_corners(base[t], room.rays)
                     aimed = t
-                more = corner_flux(room.rays, disc[:, k], -1.0, table) - out[k]
+                more = corner_flux(room.rays, disc[:, k], table) - out[k]
                 out[k] += min(beyond / TURN, 1.0) * max(more, 0.0)
 
 

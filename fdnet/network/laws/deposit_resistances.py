@@ -1,7 +1,7 @@
 """The resistance of a throat between spheres of any size, grains and fines alike.
 
 Throats that a fine bounds have sections of their own, which are summed over points; all others
-have those of `lubrication`, narrowed by a fourth sphere and by those around.
+have those of `lubrication`, narrowed by the spheres around.
 """
 
 from typing import NamedTuple
@@ -622,7 +622,7 @@ def deposit_resistances(network: Network) -> Array:
     """
     bounded, mixed = bounded_by_fines(network), mixed_pores(network)
     heights = nodes_of(network).heights
-    halves = half_resistances(network, fourth=True, heights=heights, but=bounded)
+    halves = half_resistances(network, around=True, heights=heights, but=bounded)
     near = mixed[network.pore_group[network.throat_pores]].any(axis=1)
     throats = np.flatnonzero(bounded | (near & np.isfinite(halves.sum(axis=1))))
     if not len(throats):

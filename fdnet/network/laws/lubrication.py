@@ -16,8 +16,8 @@ orifice (Happel and Brenner 1965, section 4-29).
 Where side walls hold the fluid (`Network.walls` "no-slip"), the sections that they cut are those
 of `wall_fluxes` and `edge_fluxes`. The cap of a grain centred beyond an x face shows the discs of
 a half ellipsoid (`Network.image_height`), and the flux is corrected for where the disc of the
-grain itself lies (`cut_fluxes`). With `fourth`, a section is narrowed by the fourth grain of the
-tetrahedron where that reaches in, and by the spheres around (`narrow_fluxes`).
+grain itself lies (`cut_fluxes`). With `around`, the spheres around a facet narrow the sections
+that one of its own does not reach (`narrow_fluxes`).
 """
 
 from typing import NamedTuple
@@ -37,11 +37,9 @@ from fdnet.network.laws.cross_section import (
     wall_fluxes,
 )
 from fdnet.network.laws.reaching_grains import (
-    RAYS,
     cut_corners,
     cut_fluxes,
     discs_of,
-    fourth_grains,
     narrow_fluxes,
     ray_room,
     sphere_trees,
@@ -96,7 +94,7 @@ def half_resistances(
     network: Network,
     *,
     widening: float = WIDENING,
-    fourth: bool = False,
+    around: bool = False,
     heights: Array | None = None,
     but: Array | None = None,
 ) -> Array:
@@ -109,34 +107,32 @@ def half_resistances(
     Args:
         network: pores and throats.
         widening: the factor of da^2 in the formula of this module.
-        fourth: whether the fourth grain of a tetrahedron, and those around, narrow the sections.
+        around: whether the spheres around a facet narrow the sections that one of its own does
+            not reach.
         heights: (T, 2) m, of where the sides end above the facet; of the nodes if None.
         but: (T,) whether a throat is left out; its resistance is 0. None leaves out none.
     """
     left = np.ones(len(network.throat_pores), bool) if but is None else ~but
     heights = nodes_of(network).heights if heights is None else heights
     floor, walls = LENGTH_FLOOR * network.grain_radius, wall_cuts(network)
-    trees = sphere_trees(network) if fourth else []
+    trees = sphere_trees(network) if around else []
     resistance = np.zeros((len(network.throat_pores), 2))
 
     def measure(part: slice) -> None:
         given, some = prepared(network, part, walls), np.flatnonzero(left[part])
         sections = sections_of(given, some, spans_of(heights[part][some], floor), STEPS + 1)
         flux = clear_fluxes(given, sections)
-        if fourth:
-            facet = network.image_position[network.throat_images[part]]
+        if around:
             high = np.where(left[part, None], heights[part], 0.0)
-            around = spheres_around(network, part, high, trees)
+            spheres = spheres_around(network, part, high, trees)
             narrow_fluxes(
                 sections,
                 given.base,
                 given.square,
                 given.flatness,
-                fourth_grains(network, part, facet),
-                around,
+                spheres,
                 ratio_table(),
-                ray_room(int(np.diff(around.first).max(initial=0))),
-                np.empty((6, 3 * RAYS)),
+                ray_room(int(np.diff(spheres.first).max(initial=0))),
                 flux,
             )
         cut_by_faces(given, sections, flux)

@@ -11,20 +11,13 @@ from fdnet.network.laws.cross_section import (
     RAYS,
     SWALLOWED,
     UNTOUCHED,
-    CornerRays,
     Sections,
     aim,
-    aim_at_fourth,
-    aim_corners,
-    corner_flux,
-    corner_rays,
-    depth_within,
     end_midway,
     flux_on_rays,
     set_sides,
 )
 from fdnet.network.network import Network
-from fdnet.network.tessellation.delaunay import along, less, times
 from fdnet.spheres.snapshot import Array
 
 
@@ -179,7 +172,6 @@ class RayRoom(NamedTuple):
     """(D, 3) m, their centres x and y, and radii."""
     part: Array
     """(36,) for `flux_on_rays`."""
-    corners: CornerRays
 
 
 def ray_room(most: int) -> RayRoom:
@@ -192,7 +184,6 @@ def ray_room(most: int) -> RayRoom:
         which=np.empty(most + 3, np.int64),
         disc=np.empty((most + 3, 3)),
         part=np.empty(3 * RAYS),
-        corners=corner_rays(),
     )
 
 
@@ -259,198 +250,48 @@ def share_around(base: Array, count: int, room: RayRoom, table: Array) -> float:
     return min(left / clear, 1.0) if clear > 0.0 else 1.0
 
 
-# ------------------------------------------------------------------------------------------------
-# How much of the flow through a section a fourth grain leaves that reaches into it.
-#
-# The section of a throat has three grains on its corners. It may also be entered by the fourth
-# grain of the tetrahedron on that side: by a large grain behind a small one, or by the mirror
-# image of a grain near a face. Among equal grains this does not happen.
-#
-# Each disc keeps what its rays see before a line midway to another rim or the far side of the
-# triangle. The rays of the fourth disc run from where they enter the triangle to where they leave
-# it or meet a line midway. Adding a solid never adds flow, so the share is at most 1.
-
-
-def fourth_grains(network: Network, part: slice, corner: Array) -> Array:
-    """The fourth grains (K, 2, 5) of the tetrahedra on both sides of the throats `part` (K).
-
-    They are given as in `SpheresBeside`, but their heights above the facet on their own side.
-    `corner` (K, 3, 3) m is the facet. The fourth corner of a tetrahedron is the one farthest from
-    the nearest corner of the facet.
-    """
-    pores = network.throat_pores[part]
-    image, place = np.empty(pores.shape, int), np.empty((*pores.shape, 3))
-    _find_fourth(
-        network.image_position,
-        np.ptp(network.box, axis=1),
-        network.throat_images[part],
-        pores,
-        network.throat_shift[part],
-        network.pore_images,
-        network.pore_wrap,
-        np.empty((5, 3)),
-        image,
-        place,
-    )
-    radius, flatness = discs_of(network, image, corner)
-    return np.concatenate([place, radius[..., None], flatness[..., None]], axis=2)
-
-
-@loops_in_place
-def _find_fourth(
-    position: Array,
-    size: Array,
-    facets: Array,
-    pores: Array,
-    shift: Array,
-    vertex: Array,
-    wrap: Array,
-    point: Array,
-    image: Array,
-    place: Array,
-) -> None:
-    """Sets the images (K, 2) and places (K, 2, 3) m; the others are parts of the network.
-
-    `point` (5, 3) m is room for the corners of the facet, a fourth one, and the farthest.
-    """
-    for t in range(len(facets)):
-        for k in range(3):
-            for axis in range(3):
-                turn = wrap[pores[t, 0], axis] * size[axis]
-                point[k, axis] = position[facets[t, k], axis] - turn
-        for side in range(2):
-            pore, farthest = pores[t, side], -1.0
-            for corner in range(4):
-                for axis in range(3):
-                    turn = shift[t, axis] * side - wrap[pore, axis]
-                    point[3, axis] = position[vertex[pore, corner], axis] + turn * size[axis]
-                nearest = np.inf
-                for k in range(3):
-                    square = 0.0
-                    for axis in range(3):
-                        square += (point[3, axis] - point[k, axis]) ** 2
-                    nearest = min(nearest, square)
-                if nearest > farthest:
-                    farthest, image[t, side] = nearest, vertex[pore, corner]
-                    for axis in range(3):
-                        point[4, axis] = point[3, axis]
-            edge, up, away = less(point, 1, 0), less(point, 2, 0), less(point, 4, 0)
-            long, normal = np.sqrt(along(edge, edge)), times(edge, up)
-            across, wide = times(normal, edge), np.sqrt(along(normal, normal))
-            place[t, side, 0] = along(away, edge) / long
-            place[t, side, 1] = along(away, across) / (wide * long)
-            place[t, side, 2] = abs(along(away, normal)) / wide
-
-
-@loops_inside
-def share_left(
-    base: Array,
-    disc: Array,
-    x: float,
-    y: float,
-    fourth: float,
-    rays: Array,
-    count: int,
-    part: Array,
-    corners: CornerRays,
-    table: Array,
-) -> float:
-    """Share of the flux through a triangle with discs that a fourth disc leaves, 0 to 1.
-
-    Args:
-        base: (3, 2) m, the corners.
-        disc: (3,) m, the radii of the discs on the corners.
-        x: m, of the centre of the fourth disc.
-        y: m, of the same.
-        fourth: m, its radius.
-        rays: the rays (6, 36) of the fourth disc (`aim`).
-        count: their number.
-        part: (36,) for `flux_on_rays`.
-        corners: the rays of the corners, aimed at the fourth disc (`aim_at_fourth`).
-        table: the table of `shear_ratio`.
-    """
-    clear = corner_flux(corners, disc, -1.0, table)
-    if not clear > 0.0:
-        return 1.0
-    left = corner_flux(corners, disc, fourth, table)
-    end, reach = rays[2], rays[5]
-    for p in range(count):
-        reach[p] = end[p]
-    done = UNTOUCHED
-    for i in range(3):
-        if done != SWALLOWED:
-            done = end_midway(rays, count, x, y, fourth, base[i, 0], base[i, 1], disc[i])
-    if done != SWALLOWED:
-        left += flux_on_rays(rays, count, fourth, part, table)
-    return min(left / clear, 1.0)
-
-
 @loops_in_place
 def narrow_fluxes(
     sections: Sections,
     base: Array,
     square: Array,
     flatness: Array,
-    fourth: Array,
     around: SpheresBeside,
     table: Array,
     room: RayRoom,
-    own: Array,
     flux: Array,
 ) -> None:
-    """Multiplies the `flux` (S, n) by the shares that a fourth grain and the spheres around leave.
+    """Multiplies the `flux` (S, n) of sections beyond a sphere by what the spheres around leave.
 
     Args:
         sections: of the sides.
         base: (K, 3, 2) m, corners of the facets.
         square: (K, 3) m2, of the radii of the discs in them.
         flatness: (K, 3) of these.
-        fourth: (K, 2, 5) of `fourth_grains`.
         around: of `spheres_around`.
         table: the table of `shear_ratio`.
         room: for so many spheres around a throat as there are at most.
-        own: (6, 36), room for the rays of a fourth disc.
         flux: of the sections among the grains on the corners.
     """
     before = -1
     for s in range(len(flux)):
-        t, side = sections.throat[s], sections.side[s]
-        corner, grain, sense = base[t], fourth[t, side], 2.0 * side - 1.0
+        t = sections.throat[s]
         spheres = around.place[around.first[t] : around.first[t + 1]]
-        set_sides(corner, room.side)
+        if not len(spheres):
+            continue
         if t != before:
             before = t
+            set_sides(base[t], room.side)
             for i in range(len(spheres) + 3):
                 room.number[i] = -1
-        number, depth = -1, depth_within(corner, room.side, grain[0], grain[1])
         for k in range(flux.shape[1]):
-            z, share = sections.low[s] + k * sections.step[s], 1.0
-            disc = sections.disc[s, :, k]
-            area = grain[3] ** 2 - grain[4] * (grain[2] - z) ** 2
-            if area > 0.0 and depth > -np.sqrt(area) and flux[s, k] > 0.0:
-                if number < 0:
-                    aim_corners(corner, room.corners)
-                    aim_at_fourth(corner, grain[0], grain[1], room.corners)
-                    number = aim(corner, room.side, grain[0], grain[1], own)
-                share = share_left(
-                    corner,
-                    disc,
-                    grain[0],
-                    grain[1],
-                    np.sqrt(area),
-                    own,
-                    number,
-                    room.part,
-                    room.corners,
-                    table,
-                )
-            beyond = False
+            z, beyond = sections.low[s] + k * sections.step[s], False
             for i in range(3):
                 beyond = beyond or square[t, i] - flatness[t, i] * z * z <= 0.0
-            if beyond and len(spheres) and flux[s, k] > 0.0:
-                count = meet(disc, corner, sense * z, spheres, room)
-                share = min(share, share_around(corner, count, room, table))
-            flux[s, k] *= share
+            if beyond and flux[s, k] > 0.0:
+                z *= 2.0 * sections.side[s] - 1.0
+                count = meet(sections.disc[s, :, k], base[t], z, spheres, room)
+                flux[s, k] *= share_around(base[t], count, room, table)
 
 
 # ------------------------------------------------------------------------------------------------
