@@ -83,7 +83,8 @@ def test_a_dry_run_prints_the_scales_and_writes_nothing(tmp_path, root, capsys, 
     assert not list(tmp_path.iterdir())
     assert main(["render", case, "--out", "decks"]) == 0
     assert capsys.readouterr().out.startswith(dry)
-    assert main(["run", case, "--dry-run", "--set", "box.size=[4, 4, 1e3]"]) == 2
+    assert main(["run", case, "--dry-run", "--set", "run.max_hours=1e-6"]) == 2
+    assert "fdnet run refuses this case" in capsys.readouterr().err
 
 
 def test_strict_ends_with_2_where_anything_is_odd(root, capsys):

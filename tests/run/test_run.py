@@ -1,6 +1,7 @@
 """Whole runs by command line and real binary: output contract, killing, resuming, refusals."""
 
 import contextlib
+import csv
 import fcntl
 import hashlib
 import io
@@ -312,6 +313,9 @@ def test_a_cut_run_has_a_provisional_answer_until_it_goes_on(whole, tmp_path):
     assert (said["stop_reason"], said["final"]) == ("unfinished", False)
     assert 0 < said["share_done"] < 1
     assert said["invaded_count"] < summary["supplied_count"]
+    whole_ones = [int(path.stem.split("_")[1]) for path in out.glob("invade/post/*.record")]
+    read = list(csv.DictReader((out / "history.csv").open()))
+    assert int(read[-1]["step"]) == max(whole_ones)
     start = f"Provisional, at {100 * said['share_done']:.1f} % of the invasion: so far"
     assert said["answer"].startswith(start)
     assert start in (out / "report.html").read_text()
