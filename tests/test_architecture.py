@@ -24,6 +24,7 @@ LAYERS = [
     ["campaign"],
     ["commands"],
     ["cli"],
+    ["__main__"],
 ]
 """Rooms of the package from the bottom up; a room imports from lower lines only."""
 

@@ -91,7 +91,7 @@ class Compared:
 def write_comparison(
     comparison: Comparison, limits: Mapping[str, float] | None = None
 ) -> Compared:
-    """Write table.csv, summary.json and compare.html; `limits` (SI) are those of a design."""
+    """Write table.csv, summary.json and compare.html; `limits` (SI) are those of targets."""
     from jinja2 import Environment, StrictUndefined
 
     results.write_table(comparison)

@@ -426,7 +426,7 @@ GOALS: Mapping[str, tuple[str, Callable[[str], float]]] = {
     "k_loss": ("k_reduction", share_of),
     "bridging": (PASSED, share_of),
 }
-"""Targets of a design, the largest values that are accepted: quantity, and SI from a text."""
+"""Targets of a sweep, the largest values that are accepted: quantity, and SI from a text."""
 
 
 def read_targets(targets: Mapping[str, Any]) -> dict[str, float]:
@@ -439,6 +439,4 @@ def read_targets(targets: Mapping[str, Any]) -> dict[str, float]:
             limits[name] = GOALS[name][1](str(text))
         except ValueError as error:
             raise CaseError(f"targets.{name}: {text!r}: {error}") from error
-    if not limits:
-        raise CaseError('targets: missing; give the table [targets], e.g. k_loss = "30 %"')
     return limits

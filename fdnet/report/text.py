@@ -109,6 +109,11 @@ ENDS = {
 def end_words(summary: Mapping[str, Any], control: Run) -> str:
     """Why the invasion ended, as a part of a sentence; the case's `control` has the rules."""
     reason, rate = summary["stop_reason"], summary.get("rate_over_initial")
+    if reason == "unfinished":
+        return (
+            f"the invasion was cut at {percent(summary['share_done'])} % of the steps that it is "
+            "expected to take"
+        )
     if reason != "plugged":
         return ENDS[reason]
     if control.stop_rate is not None and rate is not None and rate <= control.stop_rate:
@@ -168,6 +173,11 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
         two_digits(damage["lost_from"]),
     )
     if summary["final"] is False:
+        if summary["stop_reason"] == "unfinished":
+            return (
+                f"Provisional, at {percent(summary['share_done'])} % of the invasion: so far "
+                f"{p95}. Continue the run with --resume before you use these numbers."
+            )
         cut, more = "the run was cut at its cap", "raise run.cap_ms"
         if summary["stop_reason"] == "mud_cut_off":
             cut, more = "the mud was cut off", "give a longer fines.slab_mm"

@@ -1,6 +1,7 @@
 """Movies and pictures of a finished run: its fines, the flux of its throats, or streamlines."""
 
 import shlex
+import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -192,13 +193,15 @@ def movie_of(
     per_second: float = 4.0,
     show: str = "fines",
     force: bool = False,
+    progress: bool = False,
 ) -> Path:
     """Write the invasion of the run in `folder` as a movie; returns its path.
 
     `target` ends in .gif or .mp4 and is invasion.gif in the run folder without it. With .png it is
-    one picture of the specimen before and after. `show` is a key of `SHOWN`. Raises CaseError
-    where the folder is no finished run with fines and frames, one of its files was changed, a
-    file is there that `force` does not allow to replace, VTK is missing, or nothing can be drawn.
+    one picture of the specimen before and after. `show` is a key of `SHOWN`. With `progress`,
+    standard error says how far the drawing is. Raises CaseError where the folder is no finished
+    run with fines and frames, one of its files was changed, a file is there that `force` does not
+    allow to replace, VTK is missing, or nothing can be drawn.
     """
     if not LEAST <= per_second <= MOST:
         raise CaseError(f"--fps: {per_second:g}, expected {LEAST:g} to {MOST:g} frames a second")
@@ -225,6 +228,8 @@ def movie_of(
             if flow_of is None:
                 frames.append(MovieFrame(spheres, one.words()))
                 continue
+            if progress:
+                print(f"movie: flow of state {number + 1} of {len(moments)}", file=sys.stderr)
             flow = flow_of(
                 read_spheres(spheres, box=box).fines() if one.spheres else none, one.rate
             )
@@ -232,7 +237,7 @@ def movie_of(
             lines = Path(work, f"lines_{number:04d}.vtp")
             flow.write(lines)
             frames.append(MovieFrame(spheres, one.words(flow.k_over_k0), lines))
-        scene = Scene(grains=still, box=box, title=SHOWN[show], limits=limits)
+        scene = Scene(grains=still, box=box, title=SHOWN[show], limits=limits, told=progress)
         return write_movie(path, frames, scene, per_second=per_second)
 
 
