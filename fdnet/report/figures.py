@@ -109,7 +109,7 @@ def fill_depth(figure: Any, *, analysis: "Analysis") -> None:
     above.set_ylabel("permeability in place (mD)")
     below.set(ylabel="porosity (–)", ylim=(0, None))
     for axes in (above, below):
-        legend_above(axes)
+        legend_above(axes, columns=2)
     below.set(xlabel=DEPTH_LABEL, xlim=np.asarray(analysis.network.box[0]) * MM)
     figure.set_size_inches(7.2, 6.0)
 
