@@ -1,4 +1,4 @@
-"""The figures of a run: PNG files; depth is x, from the formation face."""
+"""The figures of a run: SVG files; depth is x, from the formation face."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,6 +23,8 @@ MM, MICRON = 1e3, 1e6
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7F7F7F"
 """Colours of Okabe and Ito (2008), which colour-blind readers can tell apart."""
 DEPTH_LABEL = "depth from the formation face (mm)"
+MOST_SHAPES = 3000
+"""Lines or circles of a figure, above which they are drawn as dots to keep the file small."""
 STYLE: Any = {
     "font.size": 11,
     "axes.grid": True,
@@ -33,21 +35,27 @@ STYLE: Any = {
     "legend.edgecolor": "white",
     "legend.framealpha": 0.9,
     "lines.linewidth": 2,
+    "font.sans-serif": ["DejaVu Sans", "Verdana"],
+    "svg.fonttype": "none",
+    "svg.hashsalt": "fdnet",
 }
 
 
 def draw(path: Path, fill: Callable[[Any], None]) -> Path:
-    """Save a figure that `fill` draws into, whole or not at all; it has no state of pyplot's."""
+    """Save a figure that `fill` draws into, whole or not at all; it has no state of pyplot's.
+
+    The end of the name says whether it is .svg, the same bytes each time, or .png.
+    """
     from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    kind = "svg" if path.suffix == ".svg" else "png"
     with rc_context(STYLE):
         figure = Figure(figsize=(7.2, 4.4), dpi=130, layout="constrained")
-        FigureCanvasAgg(figure)
         fill(figure)
         with replacing(path) as part:
-            figure.savefig(part, format="png")
+            dated = {"metadata": {"Date": None}} if kind == "svg" else {}
+            figure.savefig(part, format=kind, **dated)
     return path
 
 
@@ -99,7 +107,7 @@ def fill_depth(figure: Any, *, analysis: "Analysis") -> None:
     above.set_ylabel("permeability in place (mD)")
     below.set(ylabel="porosity (–)", ylim=(0, None))
     for axes in (above, below):
-        legend_above(axes)
+        legend_above(axes, columns=2)
     below.set(xlabel=DEPTH_LABEL, xlim=np.asarray(analysis.network.box[0]) * MM)
     figure.set_size_inches(7.2, 6.0)
 
@@ -237,6 +245,7 @@ def fill_network(figure: Any, *, analysis: "Analysis") -> None:
     ):
         order = np.argsort(np.nan_to_num(value, nan=-1.0))
         lines = LineCollection(list(segments[order]), cmap=colours, norm=scale, linewidths=1.6)
+        lines.set_rasterized(len(index) > MOST_SHAPES)
         lines.set_array(np.ma.masked_invalid(value[order]))
         axes.add_collection(lines)
         figure.colorbar(lines, ax=axes, label=label, shrink=0.9, pad=0.01)
@@ -318,6 +327,7 @@ def _circles(axes: Any, centre: Array, radius: Array, **style: Any) -> Any:
     width = 2 * radius * MM
     place = {"offsets": centre * MM, "offset_transform": axes.transData}
     circles = EllipseCollection(width, width, np.zeros(len(radius)), units="xy", **place, **style)
+    circles.set_rasterized(len(radius) > MOST_SHAPES)
     axes.add_collection(circles)
     return circles
 
@@ -403,7 +413,8 @@ def _size_steps(axes: Any, diameter: Array, curve: SizeCurve, **style: Any) -> N
     """Steps of some spheres, from the share that is left out below to that above."""
     rising = np.sort(diameter)
     finer = curve.below + curve.kept * np.cumsum(rising**3) / np.sum(rising**3)
-    axes.step(MICRON * rising, 100 * finer, where="post", linewidth=1.3, **style)
+    seen = np.linspace(0, len(rising) - 1, min(len(rising), 300)).astype(int)
+    axes.step(MICRON * rising[seen], 100 * finer[seen], where="post", linewidth=1.3, **style)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -478,7 +489,7 @@ def draw_all(
         draws["size_curves"] = partial(fill_size_curves, sizes=sizes)
     if history:
         draws["invasion_history"] = partial(fill_history, history=history)
-    return [draw(target / f"{name}.png", fill) for name, fill in draws.items()]
+    return [draw(target / f"{name}.svg", fill) for name, fill in draws.items()]
 
 
 def _section_edges(analysis: "Analysis") -> Array:

@@ -140,7 +140,7 @@ def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
     ]
     for one in results.added:
         if one.fill is not None:
-            captioned.append((figures.draw(folder / f"{one.name}.png", one.fill), one.caption))
+            captioned.append((figures.draw(folder / f"{one.name}.svg", one.fill), one.caption))
     return captioned, [reason] if reason else []
 
 
