@@ -54,7 +54,7 @@ def draw(path: Path, fill: Callable[[Any], None]) -> Path:
         figure = Figure(figsize=(7.2, 4.4), dpi=130, layout="constrained")
         fill(figure)
         with replacing(path) as part:
-            dated = {"metadata": {"Date": None}} if kind == "svg" else {}
+            dated: dict[str, Any] = {"metadata": {"Date": None}} if kind == "svg" else {}
             figure.savefig(part, format=kind, **dated)
     return path
 
@@ -340,8 +340,8 @@ def _side_frame(figure: Any, axes: Any, snapshot: Snapshot) -> None:
     start = max(min(x_lo, float(reach[0])), x_lo - 0.35 * (x_hi - x_lo)) - margin
     axes.plot([x_lo, x_hi, x_hi, x_lo], [z_lo, z_lo, z_hi, z_hi], color="black", linewidth=1)
     axes.axvline(x_lo, color=BLUE, linestyle="--", linewidth=1.6)
-    words = {"textcoords": "offset points", "color": BLUE, "fontsize": 9}
-    axes.annotate("formation face", (x_lo, z_hi), (3, 3), **words)
+    above = axes.get_xaxis_transform()
+    axes.text(x_lo, 1.01, "formation face", transform=above, color=BLUE, fontsize=9)
     axes.set(
         xlim=(start, x_hi + overhang),
         ylim=(z_lo - overhang, z_hi + overhang),
@@ -690,8 +690,10 @@ def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
     edges = np.array([-row["x_hi_m"] for row in rows] + [-rows[-1]["x_lo_m"]])
     stairs(left, edges, [row["porosity"] for row in rows], color=BLUE)
     left.set(ylabel="porosity (–)", ylim=(0, 1))
-    stairs(right, edges, [row["k_m2"] for row in rows], color=BLUE)
-    right.set(ylabel="permeability (m²)", yscale="log")
+    k = np.array([row["k_m2"] for row in rows], float) / MILLIDARCY
+    stairs(right, edges, k, color=BLUE)
+    right.set(ylabel="permeability (mD)", yscale="log")
+    plain_decades(right)
     for axes in (left, right):
         axes.set(xlabel="distance from the face (mm)", xlim=(0, MM * edges[-1]))
 
