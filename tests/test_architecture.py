@@ -64,7 +64,7 @@ DOORS = {
     "imageio_ffmpeg": {"report/picture"},
     "openpnm": {"report/tables"},
     "matplotlib": {"campaign/page", "report/figures"},
-    "PIL": {"report/picture"},
+    "PIL": {"report/html", "report/picture"},
     "numba": {"network/compiled"},
     "pymetis": {"network/flow/solver"},
     "pyamg": {"network/flow/solver"},

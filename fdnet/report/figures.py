@@ -1,4 +1,4 @@
-"""The figures of a run: PNG files; depth is x, from the formation face."""
+"""The figures of a run: SVG files; depth is x, from the formation face."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,6 +23,8 @@ MM, MICRON = 1e3, 1e6
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7F7F7F"
 """Colours of Okabe and Ito (2008), which colour-blind readers can tell apart."""
 DEPTH_LABEL = "depth from the formation face (mm)"
+MOST_SHAPES = 3000
+"""Lines or circles of a figure, above which they are drawn as dots to keep the file small."""
 STYLE: Any = {
     "font.size": 11,
     "axes.grid": True,
@@ -33,21 +35,27 @@ STYLE: Any = {
     "legend.edgecolor": "white",
     "legend.framealpha": 0.9,
     "lines.linewidth": 2,
+    "font.sans-serif": ["DejaVu Sans", "Verdana"],
+    "svg.fonttype": "none",
+    "svg.hashsalt": "fdnet",
 }
 
 
 def draw(path: Path, fill: Callable[[Any], None]) -> Path:
-    """Save a figure that `fill` draws into, whole or not at all; it has no state of pyplot's."""
+    """Save a figure that `fill` draws into, whole or not at all; it has no state of pyplot's.
+
+    The end of the name says whether it is .svg, the same bytes each time, or .png.
+    """
     from matplotlib import rc_context
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    kind = "svg" if path.suffix == ".svg" else "png"
     with rc_context(STYLE):
         figure = Figure(figsize=(7.2, 4.4), dpi=130, layout="constrained")
-        FigureCanvasAgg(figure)
         fill(figure)
         with replacing(path) as part:
-            figure.savefig(part, format="png")
+            dated: dict[str, Any] = {"metadata": {"Date": None}} if kind == "svg" else {}
+            figure.savefig(part, format=kind, **dated)
     return path
 
 
@@ -247,6 +255,7 @@ def fill_network(figure: Any, *, analysis: "Analysis") -> None:
     ):
         order = np.argsort(np.nan_to_num(value, nan=-1.0))
         lines = LineCollection(list(segments[order]), cmap=colours, norm=scale, linewidths=1.6)
+        lines.set_rasterized(len(index) > MOST_SHAPES)
         lines.set_array(np.ma.masked_invalid(value[order]))
         axes.add_collection(lines)
         figure.colorbar(lines, ax=axes, label=label, shrink=0.9, pad=0.01)
@@ -328,6 +337,7 @@ def _circles(axes: Any, centre: Array, radius: Array, **style: Any) -> Any:
     width = 2 * radius * MM
     place = {"offsets": centre * MM, "offset_transform": axes.transData}
     circles = EllipseCollection(width, width, np.zeros(len(radius)), units="xy", **place, **style)
+    circles.set_rasterized(len(radius) > MOST_SHAPES)
     axes.add_collection(circles)
     return circles
 
@@ -340,8 +350,8 @@ def _side_frame(figure: Any, axes: Any, snapshot: Snapshot) -> None:
     start = max(min(x_lo, float(reach[0])), x_lo - 0.35 * (x_hi - x_lo)) - margin
     axes.plot([x_lo, x_hi, x_hi, x_lo], [z_lo, z_lo, z_hi, z_hi], color="black", linewidth=1)
     axes.axvline(x_lo, color=BLUE, linestyle="--", linewidth=1.6)
-    words = {"textcoords": "offset points", "color": BLUE, "fontsize": 9}
-    axes.annotate("formation face", (x_lo, z_hi), (3, 3), **words)
+    above = axes.get_xaxis_transform()
+    axes.text(x_lo, 1.01, "formation face", transform=above, color=BLUE, fontsize=9)
     axes.set(
         xlim=(start, x_hi + overhang),
         ylim=(z_lo - overhang, z_hi + overhang),
@@ -413,7 +423,8 @@ def _size_steps(axes: Any, diameter: Array, curve: SizeCurve, **style: Any) -> N
     """Steps of some spheres, from the share that is left out below to that above."""
     rising = np.sort(diameter)
     finer = curve.below + curve.kept * np.cumsum(rising**3) / np.sum(rising**3)
-    axes.step(MICRON * rising, 100 * finer, where="post", linewidth=1.3, **style)
+    seen = np.linspace(0, len(rising) - 1, min(len(rising), 300)).astype(int)
+    axes.step(MICRON * rising[seen], 100 * finer[seen], where="post", linewidth=1.3, **style)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -488,7 +499,7 @@ def draw_all(
         draws["size_curves"] = partial(fill_size_curves, sizes=sizes)
     if history:
         draws["invasion_history"] = partial(fill_history, history=history)
-    return [draw(target / f"{name}.png", fill) for name, fill in draws.items()]
+    return [draw(target / f"{name}.svg", fill) for name, fill in draws.items()]
 
 
 def _section_edges(analysis: "Analysis") -> Array:
@@ -689,8 +700,10 @@ def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
     edges = np.array([-row["x_hi_m"] for row in rows] + [-rows[-1]["x_lo_m"]])
     stairs(left, edges, [row["porosity"] for row in rows], color=BLUE)
     left.set(ylabel="porosity (–)", ylim=(0, 1))
-    stairs(right, edges, [row["k_m2"] for row in rows], color=BLUE)
-    right.set(ylabel="permeability (m²)", yscale="log")
+    k = np.array([row["k_m2"] for row in rows], float) / MILLIDARCY
+    stairs(right, edges, k, color=BLUE)
+    right.set(ylabel="permeability (mD)", yscale="log")
+    plain_decades(right)
     for axes in (left, right):
         axes.set(xlabel="distance from the face (mm)", xlim=(0, MM * edges[-1]))
 

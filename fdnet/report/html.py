@@ -2,7 +2,9 @@
 
 import base64
 import html
+import io
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
@@ -101,19 +103,16 @@ def mechanics_html(folder: Path) -> str:
         return ""
     advice = "measure it anew with fdnet mechanics, or remove the folder"
     numbers = read_json(path, Mechanics, noun="result of fdnet mechanics", advice=advice)
-    parts = ["<h2>Mechanics of the pack</h2>", _table(numbers, Mechanics)]
+    parts = [_table(numbers, Mechanics)]
     if numbers.get("warnings"):
-        items = "".join(f"<li>{html.escape(text)}</li>" for text in numbers["warnings"])
+        items = "".join(f"<li>{words(text)}</li>" for text in numbers["warnings"])
         parts.append(f'<div class="warnings"><ul>{items}</ul></div>')
     if numbers.get("triaxial"):
         parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _Test)]
     figure = folder / "stress_strain.png"
     if numbers.get("triaxial") and figure.is_file():
-        parts.append(
-            f'<figure class="wide"><img src="{_data_uri(figure)}" alt="{figure.stem}">'
-            f"<figcaption><em>({figure.name})</em></figcaption></figure>"
-        )
-    return "\n".join(parts)
+        parts.append(f'<figure><img src="{_data_uri(figure)}" alt="{figure.stem}"></figure>')
+    return _folded("Mechanics of the pack", "\n".join(parts))
 
 
 def put_mechanics(report: Path, folder: Path) -> bool:
@@ -126,12 +125,15 @@ def _table(numbers: dict[str, Any], model: type[JsonObject]) -> str:
     cells = []
     for key, field_of in model.model_fields.items():
         for one in (known for known in field_of.metadata if isinstance(known, Line)):
-            value = "–" if numbers[key] is None else f"{numbers[key] * one.factor:.4g}"
+            value = quantity(multiplied(numbers[key], one.factor), one.unit)
             cells.append(
-                f'<tr><th>{html.escape(one.name)}</th><td class="number">{value} {one.unit}</td>'
-                "</tr>"
+                f'<tr><th>{html.escape(one.name)}</th><td class="number">{value}</td></tr>'
             )
-    return '<table class="pairs">\n' + "\n".join(cells) + "\n</table>"
+    return '<div class="scroll"><table>\n' + "\n".join(cells) + "\n</table></div>"
+
+
+def _folded(title: str, content: str) -> str:
+    return f"<details><summary>{title}</summary>\n{content}\n</details>"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -180,10 +182,10 @@ def stokes_html(rows: Sequence[Mapping[str, Any]]) -> str:
     head = "".join(f'<th class="number">{name}</th>' for name in _HEAD)
     cells = ["".join(f'<td class="number">{text}</td>' for text in line) for line in lines]
     body = "\n".join(f"<tr>{line}</tr>" for line in cells)
-    return (
-        "<h2>Sections by resolved Stokes flow</h2>\n"
+    return _folded(
+        "Sections by resolved Stokes flow",
         f'<div class="scroll"><table>\n<tr>{head}</tr>\n{body}\n</table></div>\n'
-        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>'
+        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>',
     )
 
 
@@ -192,7 +194,7 @@ def stokes_html(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 DASH = "–"
-LEADING, STILL = "depth.png", "spheres_3d.png"
+LEADING, STILL = "depth.svg", "spheres_3d.png"
 """The figure that stands at the top, and the picture of the specimen."""
 SECTION_COLUMNS = (  # key, heading, unit, factor to that unit
     ("section", "section", "", None),
@@ -203,8 +205,6 @@ SECTION_COLUMNS = (  # key, heading, unit, factor to that unit
     ("k_initial_m2", "k intact", "mD", 1),
     ("k_damaged_m2", "k damaged", "mD", 1),
     ("k_reduction", "k lost", "%", 1e2),
-    ("k_initial_m2", "k intact", "m²", 1),
-    ("k_damaged_m2", "k damaged", "m²", 1),
     ("k_initial_inplace_m2", "k intact, in place", "mD", 1),
     ("k_damaged_inplace_m2", "k damaged, in place", "mD", 1),
     ("fines_count", "fines", "", None),
@@ -253,7 +253,11 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     page.filters.update(
-        quantity=quantity, millidarcy=in_millidarcy, percent=percent, multiplied=multiplied
+        quantity=quantity,
+        millidarcy=in_millidarcy,
+        percent=percent,
+        multiplied=multiplied,
+        words=words,
     )
     page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
     page.globals.update(shows=SHOWS, agrees=AGREES, columns=SECTION_COLUMNS)
@@ -266,7 +270,7 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
         parts=parts,
         figures=[one for one in figures if one["name"] not in (STILL, LEADING)],
         leading=[one for one in figures if one["name"] == LEADING],
-        still=next((one for one in figures if one["name"] == STILL), None),
+        still=[one for one in figures if one["name"] == STILL],
         headline=list(facts(summary)) if "supplied_count" in summary else [],
     )
     return write_text(path, text)
@@ -275,13 +279,47 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
 def quantity(value: Any, unit: str = "") -> str:
     """A number for a reader: 4 digits, powers of ten written out, `unit` behind it.
 
-    None and NaN become a dash.
+    A whole number has all its digits; None and NaN become a dash.
     """
-    if value is None or (isinstance(value, float) and math.isnan(value)):
+    if value is None or value != value:
         return DASH
-    if isinstance(value, bool | str):
-        return str(value)
-    return f"{_digits(value)} {unit}".strip()
+    if isinstance(value, str | bool):
+        return f"{value} {unit}".strip()
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    whole = isinstance(value, int) or 1e4 <= abs(value) < 1e6
+    small = 0 < abs(value) < 1e-3
+    text = f"{value:,.0f}" if whole else f"{value:.3e}" if small else f"{value:,.4g}"
+    return f"{_POWER.sub(_power, text)} {unit}".strip()
+
+
+_POWER = re.compile(r"(?<=\d)e([+-]\d+)")
+
+
+def _power(found: re.Match[str]) -> str:
+    return "·10" + str(int(found[1])).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+_TYPESET = (
+    (r" \(see docs/reference/warnings\.md#[\w-]+\)", ""),
+    (r"; (what follows|what to do): ", r"<br><b>\1:</b> "),
+    (r"`([^`]+)`", r"<code>\1</code>"),
+    (r"-&gt;", "→"),
+    (r" m2\b", " m²"),
+    (r"(\d) (?=%|[mµ]?m\b|mD\b|MPa\b|cP\b)", r"\1&nbsp;"),
+)
+"""Pattern and replacement of what the page shows otherwise than a terminal.
+
+What the page of warnings says of a warning stands in the sentence itself, so the link goes.
+"""
+
+
+def words(text: str) -> str:
+    """A sentence as HTML."""
+    text = _POWER.sub(_power, html.escape(text))
+    for pattern, new in _TYPESET:
+        text = re.sub(pattern, new, text)
+    return text
 
 
 def multiplied(value: Any, factor: float | None) -> Any:
@@ -289,26 +327,24 @@ def multiplied(value: Any, factor: float | None) -> Any:
     return value if value is None or factor is None else value * factor
 
 
-def _digits(value: float) -> str:
-    if isinstance(value, int) or (float(value).is_integer() and abs(value) < 1e6):
-        return f"{int(value):,}".replace(",", "\u2009")
-    if 1e-3 <= abs(value) < 1e6:
-        return f"{value:.4g}" if abs(value) < 1e4 else f"{value:,.0f}".replace(",", "\u2009")
-    if not math.isfinite(value):
-        return "∞" if value > 0 else "−∞"
-    mantissa, power = f"{value:.3e}".split("e")
-    return f"{mantissa}·10{str(int(power)).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
-
-
 def _own(name: str) -> str:
     return resources.files("fdnet.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def _data_uri(path: Path) -> str:
+    """The figure in the page; the picture of the specimen as JPEG, a quarter of its PNG."""
+    kind = {".svg": "svg+xml"}.get(path.suffix, "png")
     try:
-        return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+        data = path.read_bytes()
     except OSError as error:
         raise CaseError(
             f"{path}: figure for the report cannot be read ({error.strerror}); draw it again "
             "with --stages report"
         ) from error
+    if path.name == STILL:
+        from PIL import Image
+
+        kind, small = "jpeg", io.BytesIO()
+        Image.open(path).convert("RGB").save(small, "JPEG", quality=85)
+        data = small.getvalue()
+    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"

@@ -149,7 +149,7 @@ def draw_figures(
     captioned = [(file, figures.CAPTIONS[file.stem]) for file in first + drawn]
     for one in results.added:
         if one.fill is not None:
-            captioned.append((figures.draw(folder / f"{one.name}.png", one.fill), one.caption))
+            captioned.append((figures.draw(folder / f"{one.name}.svg", one.fill), one.caption))
     return captioned, [reason] if reason else []
 
 

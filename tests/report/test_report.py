@@ -2,18 +2,19 @@
 
 import base64
 import re
+from collections import Counter
 from dataclasses import replace
 from html.parser import HTMLParser
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from builders import resting_spheres
-from matplotlib.image import imread
 
 from fdnet.errors import CaseError
 from fdnet.report import figures
 from fdnet.report.figures import cut_circles
-from fdnet.report.html import ReportParts, write_report
+from fdnet.report.html import ReportParts, quantity, words, write_report
 from fdnet.report.tables import in_millidarcy
 from fdnet.report.text import facts, summary_lines
 from fdnet.spheres.snapshot import Kind
@@ -50,7 +51,7 @@ def page_of(folder, summary, **parts):
         )
     )
     assert reader.open == []
-    return reader, re.sub("[ \\n]+", " ", " ".join(reader.text))
+    return reader, re.sub("[ \\n\xa0]+", " ", " ".join(reader.text))
 
 
 def test_nothing_is_taken_for_markup_or_fetched_from_outside(finished, tmp_path):
@@ -125,15 +126,48 @@ def test_a_missing_figure_is_named(finished, tmp_path):
 DAMAGE = {"porosity_reduction", "invaded_fraction", "permeability_ratio"}
 
 
-def test_the_page_of_a_run_has_all_its_figures_and_each_is_drawn(finished):
-    paths = list((finished.path / "figures").glob("*.png"))
+def test_the_page_of_a_run_has_all_its_figures_and_each_is_drawn(finished, analysed, tmp_path):
+    """Each is a drawing with its text as text, and the same bytes each time."""
+    paths = list((finished.path / "figures").glob("*.svg"))
     assert {path.stem for path in paths} >= DAMAGE | {"side_view", "depth", "invasion_history"}
     for path in paths:
-        picture = imread(path)[..., :3]
-        assert picture.shape[1] >= 900
-        assert (picture.min(axis=2) < 0.95).mean() > 0.02, path
+        tags = Counter(one.tag.rpartition("}")[2] for one in ElementTree.parse(path).iter())
+        assert tags["text"] >= 6, path
+        assert tags["path"] >= 6, path
     page = (finished.path / "report.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png") == len(paths)
+    assert page.count("data:image/svg+xml") == len(paths)
+    assert (
+        page.count("data:image/") - len(paths)
+        == (finished.path / "figures" / "spheres_3d.png").exists()
+    )
+    one, other = (figures.draw_all(tmp_path / name, analysed) for name in ("one", "other"))
+    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
+
+
+def test_only_the_four_parts_stand_open_and_every_link_has_its_place(finished):
+    """The answer, the case, depth, and health; all else is folded, each below one line."""
+    reader = Reader()
+    reader.feed((finished.path / "report.html").read_text(encoding="utf-8"))
+    places = {attributes.get("id") for _, attributes in reader.tags}
+    links = [attributes["href"] for tag, attributes in reader.tags if tag == "a"]
+    assert links == ["#case", "#depth", "#health", "#more"]
+    assert {link[1:] for link in links} <= places
+    tags = [tag for tag, _ in reader.tags]
+    assert (tags.count("h2"), tags.count("h1")) == (4, 1)
+    assert tags.count("details") == tags.count("summary") >= 6
+    assert not any("open" in attributes for _, attributes in reader.tags)
+
+
+def test_numbers_and_sentences_of_the_page_are_typeset_once():
+    for value, text in (
+        (192_812, "192,812"), (1.9e-10, "1.900·10⁻¹⁰"), (0.0474, "0.0474"), (12345.6, "12,346"),
+        (3.2e7, "3.2·10⁷"), (None, "–"), (float("nan"), "–"), (float("-inf"), "−∞"), (0.0, "0"),
+    ):  # fmt: skip
+        assert quantity(value) == text
+    warning = "1 < 2.5 m2; what to do: `fdnet run` (see docs/reference/warnings.md#odd-one)"
+    said = "1 &lt; 2.5 m²<br><b>what to do:</b> <code>fdnet run</code>"
+    assert words(warning).replace("&nbsp;", " ") == said
+    assert words("1.9e-10 -> 8.2e-11 m2, 5 %") == "1.9·10⁻¹⁰ → 8.2·10⁻¹¹ m², 5&nbsp;%"
 
 
 def test_a_pack_without_fines_inside_gets_no_figures_of_damage(finished, analysed, tmp_path):
