@@ -490,14 +490,8 @@ def _section_edges(analysis: "Analysis") -> Array:
     return np.array([s.x_lo for s in analysis.sections] + [analysis.sections[-1].x_hi])
 
 
-def _depth_axes(figure: Any, analysis: "Analysis") -> Any:
-    axes = figure.add_subplot()
-    axes.set(xlabel=DEPTH_LABEL, xlim=np.asarray(analysis.network.box[0]) * MM)
-    return axes
-
-
 def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
-    axes, edges = _depth_axes(figure, analysis), np.asarray(analysis.profile.edges)
+    axes, edges = figure.add_subplot(), np.asarray(analysis.profile.edges)
     label = f"{analysis.invaded_count} invaded fines"
     filled = {"fill": True, "alpha": 0.6, "linewidth": None, "baseline": 0}
     stairs(axes, edges, analysis.profile.fines_fraction, color=ORANGE, label=label, **filled)
@@ -510,6 +504,7 @@ def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
             axes.axvline(depth, color="black", linestyle=line, linewidth=1.3, label=said)
     width = np.diff(edges).mean() * MM
     axes.set(ylabel=f"share of invaded fines per {width:.3g} mm (–)", ylim=(0, None))
+    axes.set(xlabel=DEPTH_LABEL, xlim=np.asarray(analysis.network.box[0]) * MM)
     legend_above(axes)
 
 

@@ -252,13 +252,8 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
     page = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    page.filters.update(
-        quantity=quantity,
-        millidarcy=in_millidarcy,
-        percent=percent,
-        multiplied=multiplied,
-        words=words,
-    )
+    for one in (quantity, in_millidarcy, percent, multiplied, words):
+        page.filters[one.__name__] = one
     page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
     page.globals.update(shows=SHOWS, agrees=AGREES, columns=SECTION_COLUMNS)
     figures = [
