@@ -2,13 +2,16 @@
 
     import fdnet
 
+    fdnet.permeability(points, radii, box)        plain arrays in mm: k_m2, k_mD, porosity
     run = fdnet.run_case("cases/quick.toml")      the whole story of one specimen, in a run folder
-    run = fdnet.open_run("runs/quick")            the same run later: tables, spheres, network
-    spheres = fdnet.read_spheres("pack.csv", units="mm")
-    result = fdnet.analyse(spheres)               permeability without and with fines, m2
+    run = fdnet.open_run("runs/quick")            the same run later
+    run.k_damaged_mD, run.lost, run.plot()        its numbers, tables, spheres and network
+    runs = fdnet.open_runs("runs/mine-8")         an ensemble: mean, band, by_depth()
 
-`dir(fdnet)` lists what is public. Importing fdnet loads nothing heavy; a name is loaded when it is
-first used.
+Spheres from files are `read_spheres`, step by step it is `build_network`, `measure_occupancy` and
+`solve_flow`, many runs are `ensemble`, `sweep` and `compare_runs`. Every error is an `FdnetError`.
+`dir(fdnet)` lists what is public; the packages of fdnet are its inside and may change.
+Importing fdnet loads nothing heavy; a name is loaded when it is first used.
 """
 
 from importlib import import_module
@@ -17,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fdnet.campaign.api import compare_runs as compare_runs
     from fdnet.campaign.api import ensemble as ensemble
+    from fdnet.campaign.api import open_runs as open_runs
     from fdnet.campaign.api import sweep as sweep
     from fdnet.case.case import Case as Case
     from fdnet.case.case import InvasionCase as InvasionCase
@@ -40,6 +44,7 @@ if TYPE_CHECKING:
     from fdnet.network.network import build_network as build_network
     from fdnet.network.permeability import analyse as analyse
     from fdnet.network.permeability import compare as compare
+    from fdnet.network.permeability import permeability as permeability
     from fdnet.run.finished import open_run as open_run
     from fdnet.run.pipeline import run_case as run_case
     from fdnet.spheres.readers import read_spheres as read_spheres
@@ -53,10 +58,10 @@ _HOMES = {
     "fdnet.case.file": "case_from read_case",
     "fdnet.run.pipeline": "run_case",
     "fdnet.run.finished": "open_run",
-    "fdnet.campaign.api": "ensemble sweep compare_runs",
+    "fdnet.campaign.api": "open_runs ensemble sweep compare_runs",
     "fdnet.spheres.snapshot": "Snapshot",
     "fdnet.spheres.readers": "read_spheres",
-    "fdnet.network.permeability": "analyse compare",
+    "fdnet.network.permeability": "permeability analyse compare",
     "fdnet.network.network": "build_network",
     "fdnet.network.fines.occupancy": "measure_occupancy",
     "fdnet.network.flow.flow": "solve_flow",

@@ -12,33 +12,29 @@ import shlex
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
 from fdnet.commands import campaign, finished, init, mechanics, permeability, run
-from fdnet.commands.permeability import joined_box
+from fdnet.commands.options import Parser, meant
 from fdnet.errors import FdnetError, words_of
 
 COMMANDS = (
-    *(init.add_init, run.add_cases, run.add_check, run.add_run),
-    *(campaign.add_ensemble, campaign.add_sweep, campaign.add_compare, campaign.add_design),
-    *(run.add_render, permeability.add_permeability, finished.add_stokes),
-    *(mechanics.add_mechanics, finished.add_movie),
+    *(init.add_init, run.add_case_commands, permeability.add_permeability),
+    *(finished.add_commands_on_runs, mechanics.add_mechanics, campaign.add_campaign_commands),
 )
-"""What adds each command to the parser, in the order that `fdnet --help` shows."""
+"""What adds commands to the parser, in the order that `fdnet --help` shows."""
+FORMER = {
+    "cases": "fdnet init --list, and fdnet init --from CASE",
+    "design": "fdnet sweep, which takes the same file",
+}
+"""What took the place of commands that are gone."""
 
 _STOPPED = 130
 _PATIENCE = 0.2
 """Seconds after which a stop that was lost is sent once more."""
 _SIGNALS: list[int] = []
 """Signals to stop that have arrived."""
-
-
-class _Parser(argparse.ArgumentParser):
-    """One line on stderr for a bad command line too."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{self.prog}: {message}; see {self.prog} --help\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -50,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     whole = arguments is None
     _listen_for_stops(whole=whole)
     try:
-        options = _parser().parse_args(joined_box(given))
+        options = _parsed(given)
         options.command_line = shlex.join(["fdnet", *given])
         code = options.action(options)
         sys.stdout.flush()
@@ -129,23 +125,93 @@ def _one_line(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-def _parser() -> argparse.ArgumentParser:
-    common = _Parser(add_help=False)
-    common.add_argument("--debug", action="store_true", help="show a traceback on errors")
-    parser = _Parser(prog="fdnet", description=str(__doc__).splitlines()[0])
-    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
-    commands = parser.add_subparsers(required=True, metavar="command")
+def _parsed(given: Sequence[str]) -> argparse.Namespace:
+    """The options of a command line. Ends with one line on stderr where it cannot be read."""
+    parser = _parser()
+    known = commands_of(parser)
+    name = next((one for one in given if not one.startswith("-")), None)
+    if name in FORMER:
+        parser.exit(2, f"fdnet: {name} is gone; use {FORMER[name]}\n")
+    if name is not None and name not in known:
+        near = f"; did you mean run {name}?" if name.endswith(".toml") else meant(name, known)
+        parser.error(f"{name}: is no command{near}")
+    options, unknown = parser.parse_known_args(given)
+    if unknown:
+        options.parser.refuse(unknown)
+    return options
+
+
+def _parser() -> Parser:
+    parser = Parser(
+        prog="fdnet",
+        description="What do the fines of a drilling mud cost the permeability of a sand?",
+        epilog="example:\n  fdnet init --from quick && fdnet run quick.toml\n\n"
+        "fdnet COMMAND --help explains a command.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(action=_say, parser=parser)
+    parser.add_argument("--version", action="store_true", help="print the version")
+    words = 'print what completes commands, for bash and zsh: eval "$(fdnet --completion)"'
+    parser.add_argument("--completion", action="store_true", help=words)
+    commands = parser.add_subparsers(metavar="COMMAND", title="commands")
     for add in COMMANDS:
-        add(commands, common)
+        add(commands)
     return parser
 
 
-class _Version(argparse.Action):
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+def _say(options: argparse.Namespace) -> int:
+    """What `fdnet` says without a command: its version, the script of a shell, or its help."""
+    if options.version:
         from importlib import metadata
 
         print(f"fdnet {metadata.version('fdnet')}")
-        parser.exit(0)
+    elif options.completion:
+        from fdnet.case.file import shipped_cases
+
+        print(completion(commands_of(options.parser), [case.name for case in shipped_cases()]))
+    else:
+        options.parser.print_help()
+    return 0
+
+
+def commands_of(parser: argparse.ArgumentParser) -> dict[str, Parser]:
+    """The parser of each command, by its name."""
+    actions = parser._actions
+    (commands,) = (one for one in actions if isinstance(one, argparse._SubParsersAction))
+    return dict(commands.choices)
+
+
+def completion(commands: Mapping[str, Parser], cases: Sequence[str]) -> str:
+    """A script for bash and zsh that completes commands, options, their choices, and `cases`."""
+    lines = [f"    'init --from') words='{' '.join(cases)}' ;;"]
+    options = []
+    for name, parser in commands.items():
+        flags = [one for one in parser._actions if one.option_strings]
+        names = " ".join(flag for one in flags for flag in one.option_strings)
+        options.append(f"    {name}) words='{names}' ;;")
+        lines += [
+            f"    '{name} {flag}') words='{' '.join(one.choices)}' ;;"
+            for one in flags
+            if one.choices
+            for flag in one.option_strings
+        ]
+    return _SCRIPT.format("\n".join(lines), " ".join(commands), "\n".join(options))
+
+
+_SCRIPT = """\
+[ -n "$ZSH_VERSION" ] && autoload -U +X bashcompinit && bashcompinit
+_fdnet() {{
+  local word="${{COMP_WORDS[COMP_CWORD]}}" words=""
+  case "${{COMP_WORDS[1]}} ${{COMP_WORDS[COMP_CWORD-1]}}" in
+{}
+    *) [ "$COMP_CWORD" = 1 ] && words="{}" ;;
+  esac
+  [ "${{word:0:1}}" = - ] && case "${{COMP_WORDS[1]}}" in
+{}
+  esac
+  COMPREPLY=($(compgen -W "$words" -- "$word"))
+}}
+complete -o default -F _fdnet fdnet"""
 
 
 if __name__ == "__main__":

@@ -160,6 +160,10 @@ def words_of(error: Exception) -> str:
     return ""
 
 
+VIEW = "install VTK and pyvista with pip install 'fdnet[view]'"
+"""What to do where they are missing: they serve 3-D pictures, movies and ParaView files alone."""
+
+
 # ------------------------------------------------------------------------------------------------
 # Warnings: each is raised as a `Doubt`, a text with its kind. `warnings.toml` has, for every kind,
 # what follows from it, what to do, and where to read on.

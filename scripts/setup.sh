@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Makes .venv/ with the fdnet command in it, and makes sure that LIGGGHTS can run.
 #
-#   bash scripts/setup.sh [--dev] [--local]
+#   bash scripts/setup.sh [--headless | --dev] [--local]
 #
-#   --dev     also install what the tests, the linter and the type checker need
-#   --local   also as root, unpack Debian packages into the local prefix, not into the system
+#   --headless   leave out VTK and OpenGL: no 3-D pictures, movies and ParaView files
+#   --dev        also install what the tests, the linter and the type checker need
+#   --local      also as root, unpack Debian packages into the local prefix, not into the system
 #
 # As root, missing Debian packages are installed with apt-get. Without root, the same packages
 # are unpacked into .prefix/, and nothing outside the project is written.
@@ -20,7 +21,7 @@ venv="$root/.venv"
 prefix="$root/.prefix"
 readonly root venv prefix
 readonly gl_packages=(libegl1 libegl-mesa0 libgl1-mesa-dri libgl1)
-mode=user
+mode=view
 local_only=no
 python=""
 
@@ -33,13 +34,14 @@ fail() {
 read_options() {
     for option in "$@"; do
         case "$option" in
+        --headless) mode=headless ;;
         --dev) mode=dev ;;
         --local) local_only=yes ;;
         -h | --help)
             sed -n '2,/^set -e/s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
             exit 0
             ;;
-        *) fail "unknown option '$option': expected --dev, --local or --help" ;;
+        *) fail "unknown option '$option': expected --headless, --dev, --local or --help" ;;
         esac
     done
     [ "$(id -u)" -eq 0 ] || local_only=yes
@@ -93,7 +95,7 @@ list_missing_packages() {
     local package pip_from=python3-venv
     [ "$local_only" = no ] || pip_from=python3-pip-whl
     [ -n "$(find_liggghts)" ] || echo liggghts
-    for package in "${gl_packages[@]}"; do
+    [ "$mode" = headless ] || for package in "${gl_packages[@]}"; do
         has_package "$package" || echo "$package"
     done
     if [ -z "$python" ]; then
@@ -303,8 +305,8 @@ make_venv() {
 
 install_fdnet() {
     local what="$root"
-    [ "$mode" = user ] || what="${root}[dev]"
-    say "installing fdnet and its Python libraries into .venv (about 1 GB, mostly VTK)"
+    [ "$mode" = headless ] || what="${root}[$mode]"
+    say "installing fdnet and its Python libraries into .venv (about 0.6 GB, with VTK 1.2 GB)"
     quietly "$venv/bin/python" -m pip install -q --disable-pip-version-check --no-input \
         -e "$what" ||
         fail "pip install failed (above):" \
@@ -333,7 +335,10 @@ main() {
     make_venv
     install_fdnet
     check_liggghts
-    printf '%s\n' "at $root" "user $(fingerprint)" "$mode $(fingerprint)" >"$venv/.fdnet-setup"
+    {
+        printf '%s\n' "at $root" "headless $(fingerprint)" "$mode $(fingerprint)"
+        [ "$mode" != dev ] || printf '%s\n' "view $(fingerprint)"
+    } >"$venv/.fdnet-setup"
     say "ready ($venv)"
 }
 

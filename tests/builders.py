@@ -25,7 +25,7 @@ TINY: dict[str, Any] = {
         "pressure_gradient": False,
     },
     "contact": {"restitution": "dry"},
-    "run": {"time_step_factor": 0.1, "stiffness_N_m": 1e4},
+    "run": {"time_step_factor": 0.1, "stiffness_N_m": 1e4, "plug_rate": 0.0},
     "analysis": {"sections": 3},
 }
 

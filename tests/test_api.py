@@ -3,6 +3,7 @@
 import ast
 import doctest
 import inspect
+import json
 import re
 import shutil
 import subprocess
@@ -18,6 +19,7 @@ from builders import tiny
 import fdnet
 from fdnet import errors
 from fdnet.case.tables import AnalysisKeys
+from fdnet.cli import main
 
 HEAVY = ("numpy", "pandas", "scipy", "pydantic", "pyvista", "vtk", "matplotlib", "numba", "rich")
 ERRORS = {name for name in fdnet.__all__ if name.endswith("Error")}
@@ -100,11 +102,109 @@ def test_build_network_and_analyse_give_one_permeability_between_walls():
 
 def test_wrong_arguments_of_analyse_are_named():
     for spheres, periodic, expected in [
-        ("x.csv", "", "spheres: 'x.csv' is a str, expected a Snapshot; read one with fdnet.read"),
-        (lattice(), True, "periodic: True, expected letters such as 'yz', or three truth values"),
+        ("x.csv", "", "spheres: 'x.csv' is a str, expected a Snapshot or (points, radii, box); "),
+        (lattice(), 1, "periodic: 1, expected letters such as 'yz', or truth values: one, or thr"),
     ]:
         with pytest.raises(fdnet.CaseError, match=re.escape(expected)):
             fdnet.analyse(spheres, periodic=periodic)
+
+
+def packs():
+    """Points, radii and box, in mm: a cubic lattice, and a pack of two sizes with fines."""
+    places = np.indices((3, 3, 3)).reshape(3, -1).T + 0.5
+    rng = np.random.default_rng(7)
+    grains = places * [1.1, 1.0, 1.2] + rng.uniform(-0.05, 0.05, places.shape)
+    radii = np.r_[rng.uniform(0.38, 0.45, 27), np.full(9, 0.12)]
+    fines = np.indices((1, 3, 3)).reshape(3, -1).T * [1.1, 1.0, 1.2] + [1.1, 0.02, 0.01]
+    kinds = ["grain"] * 27 + ["fine"] * 9
+    yield places, np.full(27, 0.5), [3.0, 3.0, 3.0], ["grain"] * 27
+    yield np.concatenate([grains, fines]), radii, [3.3, 3.0, 3.6], kinds
+
+
+@pytest.mark.parametrize("units", ["mm", "m"])
+@pytest.mark.parametrize("periodic", ["xyz", "yz"])
+def test_permeability_of_arrays_is_that_of_the_command(tmp_path, capsys, units, periodic):
+    """To the last digit, with its warnings, along every axis."""
+    for points, radii, box, kinds in packs():
+        scale = 1.0 if units == "mm" else 1e-3
+        points, radii, box = points * scale, radii * scale, [scale * side for side in box]
+        file = tmp_path / "pack.csv"
+        rows = [
+            ",".join([*map(repr, map(float, (*p, r))), k])
+            for p, r, k in zip(points, radii, kinds, strict=True)
+        ]
+        file.write_text("\n".join(["x,y,z,radius,kind", *rows]))
+        given = ["--units", units, "--box", ",".join(f"0,{side!r}" for side in box)]
+        assert main(
+            ["permeability", str(file), *given, "--periodic", periodic, "--axis", "all", "--json"]
+        ) == 0  # fmt: skip
+        said = json.loads(capsys.readouterr().out)
+        own = {"units": units, "kind": kinds, "periodic": periodic}
+        result = fdnet.permeability(points, radii, box, axis="all", **own)
+        assert result.k_m2.tolist() == [said[f"k_{axis}_damaged_m2"] for axis in "xyz"]
+        assert result.k_initial_m2.tolist() == [said[f"k_{axis}_m2"] for axis in "xyz"]
+        assert result.porosity == said["porosity_damaged"]
+        assert list(result.warnings) == said["warnings"]
+        one = fdnet.permeability(points, radii, box, axis="y", **own)
+        assert one.k_m2 == result.k_m2[1]
+        assert one.k_mD == pytest.approx(one.k_m2 / 9.869233e-16)
+        grains = np.array(kinds) == "grain"
+        plain = (points[grains], radii[grains], box)
+        si = tuple(1e-3 / scale * np.asarray(part) for part in plain)
+        again = fdnet.analyse(si, periodic=periodic == "xyz" or periodic, axis="y")
+        assert again.k_initial == pytest.approx(one.k_initial_m2, rel=1e-9, abs=0)
+
+
+def test_the_result_of_permeability_is_a_table_and_json():
+    points, radii, box, kinds = list(packs())[1]
+    result = fdnet.permeability(points, radii, box, kind=kinds, axis="all", sections=3)
+    frame, data = result.to_frame(), json.loads(json.dumps(result.to_dict()))
+    assert frame["axis"].tolist() == ["x", "y", "z"]
+    assert frame["k_mD"].tolist() == data["k_mD"] == result.k_mD.tolist()
+    assert len(result.sections) == len(data["sections"]) == 9
+    assert {"axis", "x_lo_m", "k_damaged_m2", "fines_count"} <= set(result.sections)
+    assert np.all(result.k_m2 < result.k_initial_m2)
+    assert "<table" in result._repr_html_()
+    assert "k_mD" in str(result)
+
+
+def test_a_box_is_what_people_write():
+    """Lengths, bounds, six numbers and the cell of ASE, which is an object with __array__."""
+
+    class Cell:
+        def __array__(self, dtype=None, copy=None):
+            return np.diag([3.0, 2.0, 1.0])
+
+    place = [[0.5, 0.5, 0.5]]
+    for box in ([3, 2, 1], [[0, 3], [0, 2], [0, 1]], [0, 3, 0, 2, 0, 1], Cell()):
+        given = {"box": box, "units": "mm", "periodic": np.array([True, False, True])}
+        spheres = fdnet.Snapshot.from_arrays(place, 0.5, **given)
+        assert spheres.box.tolist() == [[0, 3e-3], [0, 2e-3], [0, 1e-3]]
+        assert spheres.periodic == (True, False, True)
+        assert (spheres.position.tolist(), spheres.radius.tolist()) == ([[5e-4] * 3], [5e-4])
+    for box, said in [
+        ([[3, 0, 0], [1, 3, 0], [0, 0, 3]], "is skewed (triclinic), expected sides along x, y"),
+        ([3, 0, 1], "expected three lengths above 0, or six numbers"),
+        ([3, 2], "expected three lengths above 0, or six numbers"),
+    ]:
+        with pytest.raises(fdnet.CaseError, match=re.escape(said)):
+            fdnet.Snapshot.from_arrays(place, 0.5, box=box)
+
+
+def test_a_wrong_unit_of_length_is_refused_or_said_aloud():
+    points, radii, box, _ = next(packs())
+    for side in (3e-3, 3000.0):
+        with pytest.raises(fdnet.CaseError, match="expected box, points and radii in one unit"):
+            fdnet.permeability(points, radii, [side] * 3)
+    with pytest.warns(UserWarning, match="which is no sand") as caught:
+        result = fdnet.permeability(points, radii, box, units="m")
+    assert "which is no sand" in result.warnings[0]
+    with pytest.warns(UserWarning, match="which is no sand") as again:
+        fdnet.analyse((points, radii, box), periodic=True)
+    assert {Path(one.filename) for one in (*caught, *again)} == {Path(__file__)}
+    for axis in ("xy", "", "X"):
+        with pytest.raises(fdnet.CaseError, match="expected x, y or z"):
+            fdnet.permeability(points, radii, box, axis=axis)
 
 
 def test_every_public_name_is_explained():

@@ -47,7 +47,7 @@ def test_what_is_odd_is_named_and_nothing_else():
 
 
 def test_a_velocity_of_no_well_and_a_finest_tenth_that_takes_the_time_are_named():
-    fast, usual = "fluid.velocity_m_s=5.0", "fluid.velocity_m_s=0.05"
+    fast, usual = "fluid.velocity_m_s=10.0", "fluid.velocity_m_s=0.05"
     assert "well" in keys(*BULKY, fast)
     assert "well" not in keys(*BULKY, usual)
     tables = tiny(*SOUND).data()

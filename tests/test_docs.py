@@ -29,7 +29,7 @@ NOW_AND_THEN = {
     *("drag_last_update", "rate_over_initial", "filtrate_m3", "cake_resistance_share"),
     *("momentum_defect_most", "spurt_m3_m2", "volume_30min_m3_m2", "filtrate_fit"),
     *("return_k_over_k0", "k_returned_m2", "clean_up"),
-    *("cpu_seconds", "peak_memory_bytes"),
+    *("cpu_seconds", "peak_memory_bytes", "share_done"),
 }
 """Keys of summary.json that a tiny run does not have."""
 SLOW = {"docs/evidence/accuracy.md"}
@@ -99,7 +99,7 @@ def test_commands_on_pages_are_ones_that_fdnet_takes():
         for line in (re.sub(r"(^|\s)#.*", "", line) for line in lines):
             match = re.search(r"(?:^|[\s/])fdnet (.*?)(?:[|>;]|$)", line)
             try:
-                _parser().parse_args(shlex.split(match[1]) if match else ["cases"])
+                _parser().parse_args(shlex.split(match[1]) if match else ["init"])
             except SystemExit as error:
                 bad += [] if error.code == 0 else [f"{name}: {line}"]
     assert not bad, "\n".join(bad)

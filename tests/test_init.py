@@ -1,4 +1,4 @@
-"""`fdnet init` and `fdnet cases`: a case file that runs, from what an engineer knows."""
+"""`fdnet init`: a case file that runs, from what an engineer knows."""
 
 import tomllib
 from pathlib import Path
@@ -152,22 +152,24 @@ def test_one_bad_answer_is_asked_for_again_and_the_others_stay(tmp_path, monkeyp
 
 
 def test_cases_lists_and_copies_what_comes_with_fdnet(tmp_path, capsys, root, monkeypatch):
-    assert main(["cases"]) == 0
+    assert main(["init", "--list"]) == 0
     listed = {line.split()[0] for line in capsys.readouterr().out.splitlines()}
     full = {path.stem for path in (root / "cases").glob("*.toml")}
     quick = {f"quick-{path.stem}" for path in (root / "cases" / "quick").glob("*.toml")}
     assert listed == full | quick
     monkeypatch.chdir(tmp_path)
-    assert main(["cases", "quick-specimen1"]) == 0
+    assert main(["init", "--from", "quick-specimen1"]) == 0
     copied = tmp_path / "quick-specimen1.toml"
     assert copied.read_text() == (root / "cases/quick/specimen1.toml").read_text()
     copied.write_text("mine")
-    assert main(["cases", "quick-specimen1"]) == 2
+    assert main(["init", "--from", "quick-specimen1"]) == 2
     assert copied.read_text() == "mine"
     assert "--force" in capsys.readouterr().err
-    assert main(["cases", "quick-specimen1", "--force"]) == 0
-    assert main(["cases", "quik"]) == 2
+    assert main(["init", "--from", "quick-specimen1", "--force"]) == 0
+    assert main(["init", "--from", "quik"]) == 2
     assert "did you mean quick?" in capsys.readouterr().err
+    assert main(["init", "--from", "quick", "--solids", "5 %"]) == 2
+    assert "leave --solids out" in capsys.readouterr().err
     text = "# A box of 4 x 2.4 mm, that is small." + chr(10) + "# More." + chr(10)
     assert first_sentence(text) == "A box of 4 x 2.4 mm, that is small"
 

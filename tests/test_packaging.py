@@ -1,9 +1,12 @@
 """The wheel carries everything: installed elsewhere it renders a deck and runs a case."""
 
+import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -21,6 +24,36 @@ import liggghts_templates
 assert liggghts_templates.__file__.startswith(sys.argv[3])
 print(fdnet.__file__, fast, run.sections.shape[0], again.k_damaged / run.summary["k_damaged_m2"])
 """
+
+
+COMES_WITH = {"PIL": "matplotlib", "pydantic_core": "pydantic", "vtkmodules": "pyvista"}
+"""Modules that are imported, and the dependency whose own requirements bring them."""
+
+
+def test_what_fdnet_imports_is_what_pyproject_asks_for(root):
+    """OpenMPI's launcher and Snakemake are started, not imported."""
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    trees = [ast.parse(path.read_text()) for path in (root / "fdnet").rglob("*.py")]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    names = [one.name for node in nodes if isinstance(node, ast.Import) for one in node.names]
+    names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+    own = {*sys.stdlib_module_names, "fdnet", "liggghts_templates"}
+    imported = {name.split(".")[0] for name in names} - own
+
+    def asked(requirements):
+        return {re.split(r"[<>=\[]", one)[0].replace("-", "_") for one in requirements}
+
+    extras = project["optional-dependencies"]
+    optional = asked(extras["view"] + extras["movie"] + extras["openpnm"]) - {"fdnet"}
+    assert {COMES_WITH.get(name, name) for name in imported} == optional | asked(
+        project["dependencies"]
+    )
+
+
+def test_the_image_has_the_debian_packages_of_the_setup(root):
+    setup, image = (root / name for name in ("scripts/setup.sh", "Dockerfile"))
+    (packages,) = re.findall(r"gl_packages=\((.*)\)", setup.read_text())
+    assert {*packages.split(), "liggghts", "python3-venv"} <= set(image.read_text().split())
 
 
 @pytest.fixture(scope="module")

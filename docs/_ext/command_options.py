@@ -11,12 +11,9 @@ SHARED = 3
 
 def commands() -> dict[str, argparse.ArgumentParser]:
     """The parser of each command."""
-    from fdnet.cli import _parser
+    from fdnet.cli import _parser, commands_of
 
-    for action in _parser()._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            return dict(action.choices)
-    raise LookupError("the parser of fdnet has no commands")
+    return commands_of(_parser())
 
 
 def shared_rows() -> list[tuple[str, str]]:

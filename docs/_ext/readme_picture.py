@@ -43,7 +43,7 @@ def draw_cut(axes: Any, spheres: pd.DataFrame) -> None:
             )
         )
     height = float((grains.z_m + grains.radius_m).max()) * MM
-    axes.set(aspect="equal", ylim=(0, height), yticks=[], ylabel=f"{height:.1f} mm")
+    axes.set(aspect="equal", ylim=(0, height), yticks=[], ylabel="cut through the sand")
     axes.tick_params(axis="x", labelbottom=False)
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from fdnet.campaign import plan as plans
 from fdnet.campaign import result as results
 from fdnet.campaign.engine import HowToRun, run_missing
-from fdnet.campaign.page import Compared, write_comparison
+from fdnet.campaign.page import Compared, compared, write_comparison
 from fdnet.campaign.plan import Plan
 from fdnet.campaign.result import RANKED_BY, Comparison
 from fdnet.case.case import Case
@@ -17,6 +17,7 @@ from fdnet.case.file import read_case
 from fdnet.errors import CaseError, FdnetError
 from fdnet.files import expanded
 from fdnet.names import STAGES
+from fdnet.run.folder import is_run_folder
 from fdnet.run.pipeline import refuse
 from fdnet.run.records import RunOptions, cores
 from fdnet.statistics.bands import seeds_for_width, student_band
@@ -96,6 +97,41 @@ def compare_runs(
         fdnet.errors.CaseError: no/such/run: does not exist; ...
     """
     return write_comparison(gathered([expanded(run) for run in runs], expanded(out), ranked_by))
+
+
+def open_runs(runs: str | Path | Sequence[str | Path], *, ranked_by: str = RANKED_BY) -> Compared:
+    """Finished runs as one object, with means and 95 % bands by quantity and by depth.
+
+    Nothing is run or written. `runs` is the folder of an ensemble or a sweep, a folder that holds
+    run folders, or a list of run folders.
+
+    Returns:
+        What `ensemble` returns: `table`, `mean`, `band`, `by_depth()`, `plot()`; lengths in m, k
+        in m2.
+
+    Raises:
+        CaseError: there is no finished run, or `ranked_by` is no quantity of its summary.
+
+    Examples:
+        >>> import fdnet
+        >>> runs = fdnet.open_runs("runs")
+        >>> runs.band.columns.tolist()
+        ['mean', 'low', 'high', 'seeds']
+        >>> 0 < float(runs.mean["k_reduction"]) < 1
+        True
+        >>> runs.by_depth().columns[:4].tolist()
+        ['variant', 'section', 'x_lo_m', 'x_hi_m']
+    """
+    if isinstance(runs, str | Path):
+        folder = expanded(runs)
+        plan = plans.kept_plan(folder) if folder.is_dir() and not is_run_folder(folder) else None
+        if plan is not None:
+            return compared(results.gather_plan(folder, plan, ranked_by=ranked_by))
+        within = sorted(folder.iterdir()) if folder.is_dir() else []
+        folders, out = [one for one in within if is_run_folder(one)] or [folder], folder
+    else:
+        folders, out = [expanded(run) for run in runs], Path()
+    return compared(results.gather_runs(folders, out, ranked_by=ranked_by))
 
 
 def gathered(runs: Sequence[Path], out: Path, ranked_by: str) -> Comparison:

@@ -7,9 +7,10 @@ import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import metadata, resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
@@ -17,9 +18,13 @@ import numpy as np
 from fdnet.campaign import result as results
 from fdnet.campaign.result import Comparison
 from fdnet.files import write_text
-from fdnet.report.tables import MILLIDARCY, read_table
+from fdnet.report import figures
+from fdnet.report.tables import MILLIDARCY
 from fdnet.statistics.bands import Band, seeds_for_width
 from fdnet.statistics.differences import MOST_SEEDS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SHOWN = ("k_reduction", "k_damaged_m2", "invasion_depth_p95_m", "invaded_count", "passed_count")
 """Quantities of the tables of the page, after the ranked one."""
@@ -27,32 +32,66 @@ SHOWN = ("k_reduction", "k_damaged_m2", "invasion_depth_p95_m", "invaded_count",
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Compared:
-    """Runs and what they say together, a sentence for each variant and each two; it prints them.
+    """Runs and what they say together; `print` gives a sentence for each variant and each two.
 
-    In the folder `path` are table.csv, summary.json and compare.html. The summary has `runs`,
-    `failed`, and by quantity `mean`, `low` and `high`.
+    The variants of an ensemble are one. Quantities are the numbers of summary.json by dotted key,
+    as "k_reduction" or "sections.1.k_damaged_m2", in SI.
+
+    Attributes:
+        comparison: the runs themselves.
+        summary: `runs`, `failed`, and by quantity `mean`, `low` and `high`.
+        ranking: a sentence for each variant, best first.
+        differences: a sentence for each two variants.
     """
 
-    path: Path
+    comparison: Comparison
     summary: Mapping[str, Any]
     ranking: tuple[str, ...]
     differences: tuple[str, ...]
 
     @property
-    def table(self) -> Any:
-        """table.csv by pandas: a row for each run, lengths in m and permeabilities in m2."""
-        columns = ("run", "variant", "seed", "status")
-        return read_table(self.path / results.TABLE, columns)
+    def path(self) -> Path:
+        """Folder of table.csv, summary.json and compare.html, where they were written."""
+        return self.comparison.path
+
+    @cached_property
+    def table(self) -> "pd.DataFrame":
+        """A row for each run with every number of its summary, lengths in m, k in m2."""
+        return results.run_table(self.comparison)
+
+    @cached_property
+    def band(self) -> "pd.DataFrame":
+        """`mean`, `low` and `high` of the 95 % band, and `seeds`: a row for each quantity.
+
+        Where there are several variants, the rows go by variant and quantity.
+        """
+        return results.band_table(self.comparison)
+
+    @property
+    def mean(self) -> "pd.Series[float]":
+        """Mean over the seeds by quantity: `runs.mean["k_reduction"]`."""
+        return self.band["mean"]
+
+    def by_depth(self) -> "pd.DataFrame":
+        """A row for each slab: edges (m), means over the seeds, and `_low` and `_high` of each."""
+        return results.depth_table(self.comparison)
+
+    def plot(self) -> Any:
+        """Permeability in place (mD) against depth (mm), mean and band; returns the axes."""
+        (axes,) = figures.shown(lambda figure: _fill_depth(figure.subplots(), self.comparison))
+        return axes
 
     def __str__(self) -> str:
         """The ranking and the differences."""
         return "\n".join([*self.ranking, *self.differences])
 
+    __repr__ = __str__
+
 
 def write_comparison(
     comparison: Comparison, limits: Mapping[str, float] | None = None
 ) -> Compared:
-    """Write table.csv, summary.json and compare.html; `limits` (SI) are those of a design."""
+    """Write table.csv, summary.json and compare.html; `limits` (SI) are those of targets."""
     from jinja2 import Environment, StrictUndefined
 
     results.write_table(comparison)
@@ -86,7 +125,17 @@ def write_comparison(
     )
     write_text(comparison.path / results.PAGE, text)
     order, gaps = (*judged, *ranking), tuple(pairs)
-    return Compared(path=comparison.path, summary=summary, ranking=order, differences=gaps)
+    return Compared(comparison=comparison, summary=summary, ranking=order, differences=gaps)
+
+
+def compared(comparison: Comparison) -> Compared:
+    """What runs say together, with nothing written."""
+    return Compared(
+        comparison=comparison,
+        summary=results.summary_of(comparison, {}),
+        ranking=tuple(ranking_lines(comparison)),
+        differences=tuple(pair_lines(comparison)),
+    )
 
 
 # ---- Sentences.
@@ -236,6 +285,18 @@ def _draw_ranking(comparison: Comparison) -> dict[str, str] | None:
 def _draw_depth(comparison: Comparison) -> dict[str, str] | None:
     """Permeability in place of the slabs by depth, of the first variants of the ranking."""
     figure, axes = _axes(4.2)
+    drawn = _fill_depth(axes, comparison)
+    if not drawn:
+        return None
+    caption = (
+        "Permeability of the slabs by depth after the invasion, mean over the seeds with its 95 % "
+        f"band, of the first {drawn} variants; dashed is the intact sand."
+    )
+    return _svg(figure, caption)
+
+
+def _fill_depth(axes: Any, comparison: Comparison) -> int:
+    """Draws permeability by depth with its bands; gives the number of variants drawn."""
     slabs = [key[:-6] for key in comparison.numbers if re.match(r"sections\.\d+\.x_lo_m", key)]
     drawn = 0
     for colour, name in zip(COLOURS, comparison.ranking(), strict=False):
@@ -254,15 +315,10 @@ def _draw_depth(comparison: Comparison) -> dict[str, str] | None:
         low, high = ([getattr(b, end) / MILLIDARCY for b in damaged] for end in ("low", "high"))
         axes.stairs(high, **look | {"baseline": low}, fill=True, alpha=0.18)
         drawn += 1
-    if not drawn:
-        return None
     axes.set(xlabel="depth (mm)", ylabel="permeability in place (mD)", ylim=(0, None))
-    axes.legend(fontsize=8, framealpha=0.9)
-    caption = (
-        "Permeability of the slabs by depth after the invasion, mean over the seeds with its 95 % "
-        f"band, of the first {drawn} variants; dashed is the intact sand."
-    )
-    return _svg(figure, caption)
+    if drawn:
+        axes.legend(fontsize=8, framealpha=0.9)
+    return drawn
 
 
 def _axes(height: float) -> tuple[Any, Any]:

@@ -48,7 +48,7 @@ class Job(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Plan:
-    """All runs of a campaign: every variant with every seed; `targets` are those of a design."""
+    """All runs of a campaign: every variant with every seed; `targets` rank them."""
 
     name: str
     variants: tuple[Variant, ...]

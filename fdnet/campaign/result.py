@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fdnet.campaign.plan import PACKS, RUNS, Plan, label_of, read_plan_record, state_of
 from fdnet.case.case import Case
@@ -23,6 +23,9 @@ from fdnet.run.records import stage_costs
 from fdnet.statistics.bands import Band, student_band
 from fdnet.statistics.differences import Difference, difference, holm
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 RANKED_BY = "k_reduction"
 PASSED = "passed_fraction"
 TABLE, SUMMARY, PAGE = "table.csv", "summary.json", "compare.html"
@@ -30,6 +33,8 @@ SHARES = re.compile(
     r"(^|\.)(k_reduction|.*porosity.*|.*_fraction|share_\w+|.*_share|\w+_loss|\w*over_initial)$"
 )
 """Quantities that are shares of one: a reader sees them in percent."""
+SLAB = re.compile(r"sections\.(\d+)\.(?!section$)(\w+)")
+"""A number of a slab, apart from its own."""
 _NEVER_NEGATIVE = re.compile(r"((?<!\bb_s)_m|_m2|_m3|_s|_count|_over_k0)$|seconds\.")
 """Lengths (but for the coefficient b_s_m), permeabilities, volumes and times. So are counts."""
 
@@ -286,11 +291,8 @@ def _variant_names(cases: Sequence[str], varied: Sequence[Mapping[str, Any]]) ->
 
 
 # ---- table.csv and summary.json.
-def write_table(comparison: Comparison) -> None:
-    """Write table.csv: a row for each run, with every number of its summary by dotted key, SI."""
-    import pandas as pd
-
-    rows = [
+def _rows(comparison: Comparison) -> list[dict[str, Any]]:
+    return [
         {
             "run": entry.name,
             "variant": entry.variant,
@@ -307,12 +309,69 @@ def write_table(comparison: Comparison) -> None:
         }
         for entry in comparison.entries
     ]
+
+
+def run_table(comparison: Comparison) -> "pd.DataFrame":
+    """A row for each run, with every number of its summary by dotted key, SI."""
+    import pandas as pd
+
+    return pd.DataFrame(_rows(comparison))
+
+
+def band_table(comparison: Comparison) -> "pd.DataFrame":
+    """Mean, 95 % band (low, high) and number of seeds by quantity, SI; of several variants by
+    variant and quantity."""
+    import pandas as pd
+
+    rows = [
+        {"variant": name, "quantity": quantity, **_band_row(comparison.band(name, quantity))}
+        | {"seeds": len(comparison.values(name, quantity))}
+        for name in comparison.variants
+        for quantity in comparison.numbers
+        if comparison.values(name, quantity)
+    ]
+    columns = ["variant", "quantity", "mean", "low", "high", "seeds"]
+    index = ["variant", "quantity"] if len(comparison.variants) > 1 else "quantity"
+    return pd.DataFrame(rows, columns=columns).set_index(index)[columns[2:]]
+
+
+def depth_table(comparison: Comparison) -> "pd.DataFrame":
+    """A row for each variant and slab: edges (m), and of each number of the slab its mean over
+    the seeds, and its 95 % band as `_low` and `_high`."""
+    import pandas as pd
+
+    rows: dict[tuple[str, int], dict[str, Any]] = {}
+    for quantity in comparison.numbers:
+        slab = SLAB.fullmatch(quantity)
+        for name in comparison.variants if slab else ():
+            if slab and comparison.values(name, quantity):
+                row = rows.setdefault((name, int(slab[1])), {})
+                band = comparison.band(name, quantity)
+                row[slab[2]] = band.mean
+                if not slab[2].startswith("x_"):
+                    row |= {f"{slab[2]}_low": band.low, f"{slab[2]}_high": band.high}
+    table = [{"variant": name, "section": n} | row for (name, n), row in rows.items()]
+    return pd.DataFrame(table).sort_values(["variant", "section"], ignore_index=True)
+
+
+def write_table(comparison: Comparison) -> None:
+    """Write table.csv, `run_table` with numbers as they are."""
+    import pandas as pd
+
     with replacing(comparison.path / TABLE) as part:
-        pd.DataFrame(rows, dtype=object).to_csv(part, index=False, lineterminator="\n")
+        table = pd.DataFrame(_rows(comparison), dtype=object)
+        table.to_csv(part, index=False, lineterminator="\n")
 
 
 def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Write summary.json, with `more` keys: means over seeds and variants, and of each variant."""
+    """Write summary.json, with `more` keys."""
+    result = summary_of(comparison, more)
+    write_text(comparison.path / SUMMARY, json.dumps(result, indent=1) + "\n")
+    return result
+
+
+def summary_of(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
+    """Means over seeds and variants, and of each variant, with `more` keys, as JSON knows them."""
     failures = [
         {"run": one.name, "status": one.status, "reason": one.reason}
         | {"folder": os.path.relpath(one.folder, comparison.path)}
@@ -335,9 +394,8 @@ def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, 
         band, seeds = comparison.overall(quantity)
         result.setdefault(quantity, _band_row(band) | {"seeds": seeds})
     text = json.dumps(result | dict(more), default=str)
-    result = json.loads(text, parse_constant=lambda _: None)
-    write_text(comparison.path / SUMMARY, json.dumps(result, indent=1) + "\n")
-    return result
+    plain: dict[str, Any] = json.loads(text, parse_constant=lambda _: None)
+    return plain
 
 
 def _variant_row(comparison: Comparison, name: str) -> dict[str, Any]:
@@ -368,7 +426,7 @@ GOALS: Mapping[str, tuple[str, Callable[[str], float]]] = {
     "k_loss": ("k_reduction", share_of),
     "bridging": (PASSED, share_of),
 }
-"""Targets of a design, the largest values that are accepted: quantity, and SI from a text."""
+"""Targets of a sweep, the largest values that are accepted: quantity, and SI from a text."""
 
 
 def read_targets(targets: Mapping[str, Any]) -> dict[str, float]:
@@ -381,6 +439,4 @@ def read_targets(targets: Mapping[str, Any]) -> dict[str, float]:
             limits[name] = GOALS[name][1](str(text))
         except ValueError as error:
             raise CaseError(f"targets.{name}: {text!r}: {error}") from error
-    if not limits:
-        raise CaseError('targets: missing; give the table [targets], e.g. k_loss = "30 %"')
     return limits

@@ -655,7 +655,7 @@ class ShippedCase(NamedTuple):
     """A case file that comes with fdnet.
 
     Attributes:
-        name: as `fdnet cases` takes it; "quick-NAME" is the quick form of NAME.
+        name: as `fdnet init --from` takes it; "quick-NAME" is the quick form of NAME.
         path: of the file.
         about: the first sentence of its comment.
     """

@@ -365,7 +365,7 @@ class Run(Part):
     need, raised at a checkpoint when the overlaps that are seen ask for it."""
     max_hours: Positive = 24.0
     """A case that is expected to run longer is refused before it starts."""
-    max_overlap: Fraction = 0.04
+    max_overlap: Fraction = 0.05
     """Overlap of a fine, over the smaller diameter, above which `on_overlap` applies. Springs by
     "auto" aim at 3 %, and few fines are pressed in deeper."""
     on_overlap: Literal["warn", "stop"] = "warn"

@@ -1,4 +1,4 @@
-"""`fdnet ensemble`, `sweep`, `compare` and `design`: commands on many runs."""
+"""`fdnet ensemble`, `sweep` and `compare`: commands on many runs."""
 
 import argparse
 import json
@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.commands.run import add_file_and_set, add_program, add_ranks, case_of, stages_of
+from fdnet.commands.options import THE_CASE, case_of, new_command, stages_of
 from fdnet.errors import CaseError
 from fdnet.files import path_option
-from fdnet.names import STAGES
 
 if TYPE_CHECKING:
     from fdnet.campaign.engine import HowToRun
@@ -19,78 +18,13 @@ if TYPE_CHECKING:
 
 SOME_FAILED = 5
 """Exit code when some of the runs have no result."""
-MOST_SEEDS = 32
 
 
-def _add_result(parser: argparse.ArgumentParser) -> None:
-    """Adds --out, --rank-by, --json and --quiet to a parser."""
-    parser.add_argument(
-        "--out", type=path_option, required=True, metavar="DIR", help="folder of the results"
-    )
-    parser.add_argument(
-        "--rank-by",
-        default="k_reduction",
-        metavar="QUANTITY",
-        help="number of the summaries that orders the variants, smallest first (default "
-        "k_reduction)",
-    )
-    parser.add_argument("--json", action="store_true", help="print summary.json")
-    parser.add_argument("--quiet", action="store_true", help="no progress")
-
-
-def _add_engine(parser: argparse.ArgumentParser) -> None:
-    """Adds the options of the result, and what decides where and how the runs are carried out."""
-    _add_result(parser)
-    add_ranks(parser)
-    add_program(parser)
-    parser.add_argument(
-        "--stages",
-        default=",".join(STAGES),
-        help="comma-separated (default: all; without report a run draws nothing)",
-    )
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        metavar="N",
-        help="runs at the same time (default: cores over ranks; 100 on a cluster)",
-    )
-    parser.add_argument(
-        "--engine",
-        choices=("auto", "local", "snakemake"),
-        default="auto",
-        help="what starts the runs: Snakemake if it is installed, or processes of fdnet (local)",
-    )
-    parser.add_argument(
-        "--slurm",
-        nargs="?",
-        const="",
-        metavar="RESOURCES",
-        help="submit the runs to Slurm through Snakemake, with its default resources, e.g. "
-        "slurm_partition=short,runtime=60",
-    )
-    parser.add_argument(
-        "--until",
-        metavar="GOAL",
-        help="add seeds until the 95 %% band is as narrow, e.g. 'k_reduction ± 5 %%' or "
-        "'k_damaged_m2 +- 10 %%'",
-    )
-    parser.add_argument(
-        "--max-seeds",
-        type=int,
-        default=MOST_SEEDS,
-        metavar="N",
-        help=f"most seeds that --until may spend (default {MOST_SEEDS})",
-    )
-    parser.add_argument(
-        "--jobs-limit",
-        type=int,
-        default=1000,
-        metavar="N",
-        help="most runs of a plan that are accepted (default 1000)",
-    )
-    parser.add_argument(
-        "--gather", action="store_true", help="run nothing; gather the runs that are there"
-    )
+_ENGINE = (
+    *("--out", "--stages", "--rank-by", "--json", "--quiet"),
+    *("--np", "--liggghts", "--launcher", "--timeout"),
+    *("--jobs", "--jobs-limit", "--engine", "--slurm", "--until", "--max-seeds", "--gather"),
+)
 
 
 def _how_of(options: argparse.Namespace) -> "HowToRun":
@@ -169,21 +103,32 @@ def _run_campaign(
 # The commands.
 
 
-def add_ensemble(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds `fdnet ensemble`: one case with several seeds, and the band of every number."""
-    parser = commands.add_parser(
-        "ensemble", parents=[common], help="one case with several seeds, with 95 %% bands"
+def add_campaign_commands(commands: Any) -> None:
+    """Adds `fdnet ensemble`, `sweep` and `compare` to the command line."""
+    about = "run one case with several seeds, and give every number with its 95 % band"
+    example = "fdnet ensemble mine.toml --seeds 8 --out runs/mine-8"
+    parser = new_command(commands, "ensemble", _run_ensemble, about, example)
+    parser.share("case", "--seed", "--set")
+    number = "number of seeds, from that of the case on (default 4)"
+    parser.add(THE_CASE, "--seeds N", number, int, 4)
+    parser.share(*_ENGINE)
+
+    about = "run and compare the cases and seeds of a file, and rank them by its targets"
+    example = "fdnet sweep cases/sweeps/bridging.toml --out runs/bridging"
+    parser = new_command(commands, "sweep", _run_sweep, about, example)
+    file = "the sweep file; with [targets] the variants are ranked by whether they meet them"
+    parser.add(THE_CASE, "sweep SWEEP.toml", file, path_option)
+    parser.share(*_ENGINE)
+
+    about = "compare finished runs, with 95 % bands over seeds"
+    example = "fdnet compare runs/thin runs/thick --out runs/compared"
+    parser = new_command(commands, "compare", _run_compare, about, example)
+    folders = (
+        "run folders; the folder of an ensemble or a sweep stands for all its runs, and its own "
+        "results are written anew where it is --out too"
     )
-    add_file_and_set(parser)
-    parser.add_argument(
-        "--seeds",
-        type=int,
-        default=4,
-        metavar="N",
-        help="number of seeds, from that of the case on (default 4)",
-    )
-    _add_engine(parser)
-    parser.set_defaults(action=_run_ensemble)
+    parser.add(THE_CASE, "runs RUN", folders, path_option, nargs="+")
+    parser.share("--out", "--rank-by", "--json")
 
 
 def _run_ensemble(options: argparse.Namespace) -> int:
@@ -193,63 +138,15 @@ def _run_ensemble(options: argparse.Namespace) -> int:
     return _run_campaign(options, plan)
 
 
-def add_sweep(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds `fdnet sweep`: every combination of keys, variants, cases and seeds of a file."""
-    parser = commands.add_parser(
-        "sweep", parents=[common], help="many cases and seeds, compared with 95 %% bands"
-    )
-    parser.add_argument("sweep", type=path_option, metavar="SWEEP.toml", help="the sweep file")
-    _add_engine(parser)
-    parser.set_defaults(action=_run_sweep)
-
-
 def _run_sweep(options: argparse.Namespace) -> int:
     from fdnet.campaign.plan import sweep_plan
+    from fdnet.campaign.result import read_targets
 
-    return _run_campaign(options, sweep_plan(options.sweep, **_plan_options(options)))
-
-
-def add_compare(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds `fdnet compare`: finished runs, grouped by what differs in their cases."""
-    parser = commands.add_parser(
-        "compare", parents=[common], help="compare finished runs, with 95 %% bands over seeds"
-    )
-    parser.add_argument(
-        "runs",
-        nargs="+",
-        type=path_option,
-        metavar="RUN",
-        help="run folders; the folder of an ensemble or a sweep stands for all its runs, and its "
-        "own results are written anew where it is --out too",
-    )
-    _add_result(parser)
-    parser.set_defaults(action=_run_compare)
+    plan = sweep_plan(options.sweep, **_plan_options(options))
+    return _run_campaign(options, plan, read_targets(plan.targets))
 
 
 def _run_compare(options: argparse.Namespace) -> int:
     from fdnet.campaign.api import gathered
 
     return _finish(options, gathered(options.runs, options.out, options.rank_by))
-
-
-def add_design(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds `fdnet design`: candidate muds for a sand, ranked by targets with their reasons."""
-    parser = commands.add_parser(
-        "design", parents=[common], help="rank candidate muds for a sand by targets"
-    )
-    parser.add_argument(
-        "sweep",
-        type=path_option,
-        metavar="DESIGN.toml",
-        help="a sweep file with the table [targets]",
-    )
-    _add_engine(parser)
-    parser.set_defaults(action=_run_design)
-
-
-def _run_design(options: argparse.Namespace) -> int:
-    from fdnet.campaign.plan import sweep_plan
-    from fdnet.campaign.result import read_targets
-
-    plan = sweep_plan(options.sweep, **_plan_options(options))
-    return _run_campaign(options, plan, read_targets(plan.targets))

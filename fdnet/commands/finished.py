@@ -6,33 +6,37 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
+from fdnet.commands.options import OUTPUT, THE_FLOW, THE_PICTURE, new_command
 from fdnet.files import path_option
 
 
-def add_movie(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds the command to the command line."""
-    movie = commands.add_parser(
-        "movie", parents=[common], help="the invasion of a finished run as a GIF, MP4 or picture"
+def add_commands_on_runs(commands: Any) -> None:
+    """Adds `fdnet stokes` and `movie` to the command line."""
+    about = "compute sections of a finished run by resolved flow, to check the network"
+    parser = new_command(commands, "stokes", _stokes, about, "fdnet stokes runs/mine --section 2")
+    parser.add(THE_FLOW, "run RUN", "run folder", path_option)
+    number = "number of a section, 1 at the face (default 1); may be given again"
+    parser.add(THE_FLOW, "--section N", number, int, action="append")
+    cells = "cells across the mean radius of a fine, on the finer of two grids (default 3.5)"
+    parser.add(THE_FLOW, "--across CELLS", cells, float)
+    parser.share("--json", "--quiet")
+
+    about = "draw the invasion of a finished run as a movie, or a picture of before and after"
+    movie = new_command(commands, "movie", _movie, about, "fdnet movie runs/mine --show flux")
+    movie.add(OUTPUT, "run RUN", "run folder", path_option)
+    what = (
+        "the fines alone (default), or with them the flux of every throat, or streamlines (half a "
+        "minute and more)"
     )
-    movie.add_argument("run", type=path_option, help="run folder")
-    movie.add_argument(
-        "--out",
-        type=path_option,
-        help="the movie, .gif or .mp4 (default RUN/invasion.gif), or one picture of before and "
-        "after, .png",
+    shown = ("fines", "flux", "streamlines")
+    movie.add(THE_PICTURE, "--show", what, default="fines", choices=shown)
+    movie.add(THE_PICTURE, "--fps N", "frames a second (default 4)", float, 4.0)
+    file = (
+        "the movie, .gif or .mp4 (default RUN/invasion.gif), or one picture of before and after, "
+        ".png"
     )
-    movie.add_argument(
-        "--show",
-        choices=("fines", "flux", "streamlines"),
-        default="fines",
-        help="the fines alone (default), or with them the flux of every throat, or streamlines "
-        "(half a minute and more)",
-    )
-    movie.add_argument(
-        "--fps", type=float, default=4.0, metavar="N", help="frames a second (default 4)"
-    )
-    movie.add_argument("--force", action="store_true", help="replace a file that is there")
-    movie.set_defaults(action=_movie)
+    movie.add(OUTPUT, "--out FILE", file, path_option)
+    movie.share("--force", "--quiet")
 
 
 def _movie(options: argparse.Namespace) -> int:
@@ -44,39 +48,10 @@ def _movie(options: argparse.Namespace) -> int:
         per_second=options.fps,
         show=options.show,
         force=options.force,
+        progress=not options.quiet,
     )
     print(f"{'picture' if path.suffix.lower() == '.png' else 'movie'}: {path}")
     return 0
-
-
-# ------------------------------------------------------------------------------------------------
-# `fdnet stokes`: sections of a finished run by resolved Stokes flow.
-
-
-def add_stokes(commands: Any, common: argparse.ArgumentParser) -> None:
-    """Adds the command to the command line."""
-    parser = commands.add_parser(
-        "stokes",
-        parents=[common],
-        help="sections of a finished run by resolved flow, to check the network",
-    )
-    parser.add_argument("run", type=path_option, help="run folder")
-    parser.add_argument(
-        "--section",
-        type=int,
-        action="append",
-        metavar="N",
-        help="number of a section, 1 at the face (default 1); may be given again",
-    )
-    parser.add_argument(
-        "--across",
-        type=float,
-        metavar="CELLS",
-        help="cells across the mean radius of a fine, on the finer of two grids (default 3.5)",
-    )
-    parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
-    parser.add_argument("--quiet", action="store_true", help="no progress")
-    parser.set_defaults(action=_stokes)
 
 
 def _stokes(options: argparse.Namespace) -> int:

@@ -6,51 +6,30 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from fdnet.commands.run import add_overrides, overrides_of
+from fdnet.commands.options import OUTPUT, THE_CASE, THE_TEST, new_command, overrides_of
 from fdnet.errors import CaseError
 from fdnet.files import path_option
 
 
-def add_mechanics(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_mechanics(commands: Any) -> None:
     """Adds the command to the command line."""
-    parser = commands.add_parser(
-        "mechanics",
-        parents=[common],
-        help="elastic moduli and triaxial tests of a pack, without time steps",
+    about = "measure elastic moduli of a pack, and its triaxial test, without time steps"
+    example = "fdnet mechanics runs/mine --set bonds.radius_ratio=0.5"
+    parser = new_command(commands, "mechanics", _mechanics, about, example)
+    parser.add(THE_CASE, "source CASE.toml", "the case file, or a run folder", path_option)
+    parser.share("--seed", "--set", "--liggghts")
+    confining = (
+        "confining stress of the triaxial test, and the pressure that sets the stiffness of Hertz "
+        "contacts"
     )
-    parser.add_argument(
-        "source", type=path_option, metavar="CASE.toml", help="the case file, or a run folder"
-    )
-    add_overrides(parser, example="bonds.radius_ratio=0.5")
-    parser.add_argument(
-        "--out", type=path_option, help="run folder of a case file (default runs/NAME)"
-    )
-    parser.add_argument(
-        "--confining_MPa",
-        type=float,
-        metavar="MPA",
-        help="confining stress of the triaxial test, and the pressure that sets the stiffness of "
-        "Hertz contacts",
-    )
-    parser.add_argument(
-        "--triaxial",
-        action="store_true",
-        help="compress the pack along x with the confining stress on its sides, until --strain",
-    )
-    parser.add_argument(
-        "--strain",
-        type=float,
-        default=0.01,
-        metavar="SHARE",
-        help="axial strain at the end of the triaxial test (default 0.01)",
-    )
-    parser.add_argument(
-        "--steps", type=int, default=20, metavar="N", help="load steps of it (default 20)"
-    )
-    parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
-    parser.add_argument("--liggghts", metavar="PATH", help="the LIGGGHTS binary")
-    parser.add_argument("--quiet", action="store_true", help="no progress")
-    parser.set_defaults(action=_mechanics)
+    parser.add(THE_TEST, "--confining-MPa MPA", confining, float)
+    triaxial = "compress the pack along x with the confining stress on its sides, until --strain"
+    parser.add(THE_TEST, "--triaxial", triaxial)
+    strain = "axial strain at the end of the triaxial test (default 0.01)"
+    parser.add(THE_TEST, "--strain SHARE", strain, float, 0.01)
+    parser.add(THE_TEST, "--steps N", "load steps of the triaxial test (default 20)", int, 20)
+    parser.add(OUTPUT, "--out DIR", "run folder of a case file (default runs/NAME)", path_option)
+    parser.share("--json", "--quiet")
 
 
 def _mechanics(options: argparse.Namespace) -> int:
@@ -66,10 +45,10 @@ def _mechanics(options: argparse.Namespace) -> int:
     given, pressure = options.confining_MPa, None
     if given is not None:
         if not 0 < given < 1e9:
-            raise CaseError(f"--confining_MPa: {given}, expected a stress above 0, in MPa")
+            raise CaseError(f"--confining-MPa: {given}, expected a stress above 0, in MPa")
         pressure = given * 1e6
     if options.triaxial and given is None:
-        raise CaseError("--triaxial: needs the stress on the sides; give --confining_MPa")
+        raise CaseError("--triaxial: needs the stress on the sides; give --confining-MPa")
     if options.triaxial and not 0 < options.strain <= 0.3:
         raise CaseError(f"--strain: {options.strain}, expected a share above 0, at most 0.3")
     if options.triaxial and not 1 <= options.steps <= 10_000:

@@ -1,11 +1,14 @@
 """`fdnet permeability`: the permeability of spheres in a file, without LIGGGHTS."""
 
 import argparse
+import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fdnet.commands.options import OUTPUT, THE_FLOW, THE_SPHERES, new_command
 from fdnet.errors import CaseError, Doubt, explained
 from fdnet.files import path_option
 from fdnet.names import (
@@ -32,98 +35,60 @@ ALL_AXES = "all"
 _LAWS_START = b"law,damage_law,"
 
 
-def add_permeability(commands: Any, common: argparse.ArgumentParser) -> None:
+def add_permeability(commands: Any) -> None:
     """Adds the command to the command line."""
-    parser = commands.add_parser(
-        "permeability",
-        parents=[common],
-        help="permeability of a file of spheres, without LIGGGHTS",
+    about = "compute the permeability of a file of spheres, without LIGGGHTS"
+    example = "fdnet permeability spheres.csv --units mm --box 0,4,0,4,0,4 --periodic xyz"
+    parser = new_command(commands, "permeability", run, about, example)
+    parser._negative_number_matcher = re.compile(r"-[\d.][-+\d.,eE]*$")  # --box -1,1,... too
+    spheres, flow = partial(parser.add, THE_SPHERES), partial(parser.add, THE_FLOW)
+    spheres(
+        "spheres SPHERES",
+        "text (columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]), LIGGGHTS or LAMMPS text "
+        "dump (its last whole frame), .vtp, .vtu or .vtk with point data radius or diameter; each "
+        "also as .gz",
+        path_option,
     )
-    parser.set_defaults(action=run)
-    parser.add_argument(
-        "spheres",
-        type=path_option,
-        metavar="SPHERES",
-        help="text (columns x,y,z,radius[,kind] or x_m,...,radius_m[,kind]), LIGGGHTS or LAMMPS "
-        "text dump (its last whole frame), .vtp, .vtu or .vtk with point data radius or "
-        "diameter; each also as .gz",
-    )
-    parser.add_argument(
+    spheres(
         "--units",
+        "unit of length of the file, of --box and of --fines-below (not with x_m columns; default "
+        "for a dump or VTK file: m)",
         choices=UNITS,
-        help="unit of length of the file, of --box and of --fines-below (not with x_m columns; "
-        "default for a dump or VTK file: m)",
     )
-    parser.add_argument(
-        "--box",
-        metavar="x0,x1,y0,y1,z0,z1",
-        help="the specimen, in the unit of the file (default: the box of the dump, else the box "
-        "around all grains)",
+    spheres(
+        "--box x0,x1,y0,y1,z0,z1",
+        "the specimen, in the unit of the file (default: the box of the dump, else the box around "
+        "all grains)",
     )
-    parser.add_argument(
-        "--fines-below",
-        type=float,
-        metavar="RADIUS",
-        help="spheres of a smaller radius are fines, in the unit of the file",
+    smaller = "spheres of a smaller radius are fines, in the unit of the file"
+    spheres("--fines-below RADIUS", smaller, float)
+    types = "which types of a dump are grains and which fines (default 1=grain,2=fine)"
+    spheres("--types TYPE=KIND,...", types)
+    spheres(
+        "--periodic DIRS",
+        "periodic directions of the file, any of x, y, z together; others are walls (default: "
+        "those of the dump's BOX BOUNDS, else none; '' for none)",
     )
-    parser.add_argument(
-        "--types",
-        metavar="TYPE=KIND,...",
-        help="which types of a dump are grains and which fines (default 1=grain,2=fine)",
-    )
-    parser.add_argument(
-        "--axis",
-        choices=("x", "y", "z", ALL_AXES),
-        default="x",
-        help="flow direction; all: the three one after another (default x)",
-    )
-    parser.add_argument(
-        "--periodic",
-        metavar="DIRS",
-        help="periodic directions of the file, any of x, y, z together; others are walls "
-        "(default: those of the dump's BOX BOUNDS, else none; '' for none)",
-    )
-    parser.add_argument(
+    axes = "flow direction; all: the three one after another (default x)"
+    flow("--axis", axes, default="x", choices=("x", "y", "z", ALL_AXES))
+    flow(
         "--walls",
-        choices=WALL_NAMES,
+        "side walls hold the fluid, or it slips along them: slip for spheres cut out of a larger "
+        "pack (default no-slip; known to lubrication and its damage laws)",
         default="no-slip",
-        help="side walls hold the fluid, or it slips along them: slip for spheres cut out of a "
-        "larger pack (default no-slip; known to lubrication and its damage laws)",
+        choices=WALL_NAMES,
     )
-    parser.add_argument(
-        "--sections", type=_count, default=1, metavar="N", help="slabs along the flow (default 1)"
-    )
-    parser.add_argument(
-        "--law", choices=LAW_NAMES, help=f"conductance law (default {DEFAULT_LAW})"
-    )
-    parser.add_argument(
+    flow("--sections N", "slabs along the flow (default 1)", _count, 1)
+    flow("--law", f"conductance law (default {DEFAULT_LAW})", choices=LAW_NAMES)
+    flow(
         "--damage-law",
+        f"damage law (default {AUTO}: up to {MOST_SPHERES} spheres {ALL_SPHERES}, above "
+        f"{SECTION_ARCHIE})",
         choices=DAMAGE_LAW_NAMES,
-        metavar="NAME",
-        help=f"damage law: {', '.join(DAMAGE_LAW_NAMES)} (default {AUTO}: up to {MOST_SPHERES} "
-        f"spheres {ALL_SPHERES}, above {SECTION_ARCHIE})",
     )
-    parser.add_argument(
-        "--compare-laws", action="store_true", help="all laws with all damage laws as a table"
-    )
-    parser.add_argument(
-        "--csv", type=path_option, metavar="FILE", help="write the laws, one row each, as CSV"
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
-
-
-def joined_box(arguments: Sequence[str]) -> list[str]:
-    """The arguments with `--box -1,1,...` as `--box=-1,1,...`.
-
-    argparse takes a separate value that begins with a minus sign for an option.
-    """
-    result: list[str] = []
-    for argument in arguments:
-        if result and result[-1] == "--box" and argument[:1] == "-" and "," in argument:
-            result[-1] = f"--box={argument}"
-        else:
-            result.append(argument)
-    return result
+    flow("--compare-laws", "all laws with all damage laws as a table")
+    parser.add(OUTPUT, "--csv FILE", "write the laws, one row each, as CSV", path_option)
+    parser.share("--json")
 
 
 def _count(text: str) -> int:
@@ -197,11 +162,6 @@ def types_of(text: str) -> dict[int, str]:
 
 
 PROFILE_BINS = 32
-_TOUCH = 0.2
-"""Part of its radius by which a sphere may reach across a wall: pressed grains do."""
-_MANY = 0.25
-"""Part of the spheres that would cross the sides of a periodic pack, above which those that cross
-side walls are reported."""
 _LARGE_FINE = 0.5
 """Part of the smallest grain's radius up to which spheres of type 2 are fines unasked."""
 
@@ -296,6 +256,7 @@ def _read(options: argparse.Namespace) -> "SphereFile":
 
 def _along(axis: str, given: "SphereFile", options: argparse.Namespace) -> list[dict[str, Any]]:
     """What each pair of laws gives for flow along `axis`, the chosen pair first."""
+    from fdnet.network.specimen import pack_doubts
     from fdnet.report.text import thesis_law_warning
 
     spheres, along, periodic = given.spheres.turned(axis), "xyz".index(axis), given.periodic
@@ -303,9 +264,7 @@ def _along(axis: str, given: "SphereFile", options: argparse.Namespace) -> list[
     notes = list(given.warnings)
     if given.around_grains:
         notes.append(Doubt("no-box", "no --box given: the box around all grains was used"))
-    if options.walls == "no-slip":
-        notes += _crossing(given.spheres, periodic, axis)
-    notes += _overlaps(spheres, around)
+    notes += pack_doubts(given.spheres, axis, options.walls)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
     rows: list[dict[str, Any]] = []
     first: Analysis | None = None
@@ -374,39 +333,6 @@ def _assumptions(
         yield f"The conductance law is fdnet's default, {DEFAULT_LAW}."
     if len(spheres.fines()):
         yield "Fines and grains stay where they are."
-
-
-def _overlaps(spheres: "Snapshot", periodic: tuple[bool, bool, bool]) -> Iterator[str]:
-    """Warnings where the spheres that add to the solid overlap, as `fdnet run` has them."""
-    from fdnet.spheres.geometry import inside_others, max_overlap, overlap_doubts
-
-    seen = spheres.where(~inside_others(spheres, periodic)[0])
-    return overlap_doubts(
-        max_overlap(seen.grains(), periodic), max_overlap(seen, periodic, only_fines=True)
-    )
-
-
-def _crossing(spheres: "Snapshot", periodic: tuple[bool, bool, bool], axis: str) -> Iterator[str]:
-    """A warning where many spheres reach across the side walls, as those of a periodic pack do."""
-    import numpy as np
-
-    walls = np.array([not periodic[k] and "xyz"[k] != axis for k in range(3)])
-    reach = spheres.radius[:, None] * (1 - _TOUCH)
-    low, high = spheres.box.T
-    beyond = ((spheres.position - reach < low) | (spheres.position + reach > high)) & walls
-    count = int(np.sum(beyond.any(axis=1)))
-    expected = 2.0 * reach.mean() * len(spheres) * np.sum(walls / (high - low))
-    if count > max(_MANY * expected, 3):
-        sides = "".join(
-            name
-            for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
-            if crossed or repeats
-        )
-        yield Doubt(
-            "crossing-walls",
-            f"{count} of {len(spheres)} spheres cross the side walls; if the pack is periodic "
-            f"give --periodic {sides}",
-        )
 
 
 def _sides(periodic: tuple[bool, bool, bool], options: argparse.Namespace) -> str:

@@ -317,7 +317,8 @@ class EndedStage:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Invasion(EndedStage):
-    """A finished invasion; `stop_reason` is also "plugged", "supply_exhausted", "mud_cut_off".
+    """A finished invasion; `stop_reason` is also "plugged", "supply_exhausted", "mud_cut_off",
+    or "unfinished" of one that was cut.
 
     Attributes:
         supplied: number of fines that took part: all, or those of the batches that had come.
@@ -514,12 +515,46 @@ def invade(
         case=case, scales=scales, grains=grains, points=points, launch=launch, fluid=fluid
     )
     deck, runs = stage.drive()
-    history, batches = read_history(folder), batches_of(case, scales)
+    history = read_history(folder)
+    reason, warnings = stage.ending(history)
+    made = (warnings + points.doubts(), deck.left_out, runs, launch.ranks)
+    return _read(case, scales, grains, folder, history, reason, *made)
+
+
+def invasion_so_far(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
+) -> Invasion | None:
+    """The cut invasion in `folder` at its last whole checkpoint; None without one.
+
+    Nothing is written. Its stop reason is "unfinished".
+    """
+    points = Checkpoints(folder=folder, digest=case.digest("invade"))
+    last = points.last()
+    record = None if last is None else points.record(last.step)
+    if last is None or record is None:
+        return None
+    history = tuple(row for row in read_history(folder) if row.step <= last.step)
+    made = (points.doubts(), (), (), record.ranks)
+    return _read(case, scales, grains, folder, history, "unfinished", *made)
+
+
+def _read(
+    case: InvasionCase,
+    scales: InvasionScales,
+    grains: Snapshot,
+    folder: Path,
+    history: tuple[Checkpoint, ...],
+    reason: str,
+    warnings: list[str],
+    left_out: tuple[LeftOut, ...],
+    runs: tuple[Execution, ...],
+    ranks: int,
+) -> Invasion:
+    """The invasion whose files are in `folder`, up to the last checkpoint of the `history`."""
+    batches, step = batches_of(case, scales), history[-1].step
     overlaps, damaged = [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
-    reason, warnings = stage.ending(history)
-    warnings += points.doubts()
     if len(overlaps) < len(history):
         warnings.append(
             Doubt(
@@ -533,11 +568,11 @@ def invade(
         history=history,
         stop_reason=reason,
         supplied=batches.supplied(entered_by(case, batches, history[-1])),
-        overlap=deepest_of([*overlaps, *read_watch(folder)]),
+        overlap=deepest_of([*overlaps, *(one for one in read_watch(folder) if one.step <= step)]),
         step_s=scales.time_step,
-        left_out=deck.left_out,
+        left_out=left_out,
         warnings=tuple(warnings),
-        ranks=launch.ranks,
+        ranks=ranks,
         runs=runs,
-        updates=tuple(read_updates(folder)),
+        updates=tuple(row for row in read_updates(folder) if row["step"] < step),
     )

@@ -178,7 +178,7 @@ def pack_material(case: Case, grains: Snapshot, pressure_Pa: float | None = None
     elif pressure_Pa is None:
         raise CaseError(
             "contact.model: 'hertz' contacts have no stiffness without a load; give "
-            "--confining_MPa, or take contact.model = 'hooke'"
+            "--confining-MPa, or take contact.model = 'hooke'"
         )
     elif not np.any((joints := find_joints(grains, case.periodic)).branch):
         normal, shear = 1.0, 1.0

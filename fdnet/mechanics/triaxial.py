@@ -561,7 +561,7 @@ def confined(
     overlap = mean_force(grains, joints, stress) / material.normal / diameter
     if overlap > MOST_OVERLAP:
         raise CaseError(
-            f"--confining_MPa: {stress / 1e6:g} presses grains {100 * overlap:.3g} % of a "
+            f"--confining-MPa: {stress / 1e6:g} presses grains {100 * overlap:.3g} % of a "
             f"diameter into each other, expected at most {100 * MOST_OVERLAP:g} % "
             f"({stress / 1e6 * MOST_OVERLAP / overlap:.3g} MPa); lower the stress or raise "
             "grains.normal_stiffness_N_m"
@@ -586,7 +586,7 @@ def _falls_apart(pack: Deformed, test: Triaxial) -> MechanicsError:
     """What is said of a pack that has no contact left, or whose box has no volume left."""
     return MechanicsError(
         f"pack of {len(pack.grains)} grains falls apart under {test.confining:.3g} Pa: its "
-        "contacts open before they bear the stress; take a denser pack, a lower --confining_MPa, "
+        "contacts open before they bear the stress; take a denser pack, a lower --confining-MPa, "
         "or bonds"
     )
 

@@ -1,14 +1,16 @@
 """Permeability of a pack before and after fines: the whole network analysis of one specimen."""
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from html import escape
 from itertools import product
-from typing import Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from fdnet.case.tables import AnalysisChoices, AnalysisKeys, with_visible_choices
-from fdnet.errors import Doubt
+from fdnet.case.tables import M2_PER_MD, AnalysisChoices, AnalysisKeys, with_visible_choices
+from fdnet.errors import CaseError, Doubt, explained
 from fdnet.names import ALL_SPHERES, AUTO, SECTION_ARCHIE, law_pairs
 from fdnet.network.fines.occupancy import Occupancy
 from fdnet.network.flow.flow import Flow
@@ -28,8 +30,9 @@ from fdnet.network.laws.damage import CLEAN
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network
 from fdnet.network.specimen import (
+    as_snapshot,
     measure_specimen,
-    require_snapshots,
+    pack_doubts,
     specimen_doubts,
 )
 from fdnet.network.states import (
@@ -41,6 +44,9 @@ from fdnet.network.states import (
     few_throats,
 )
 from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, sides_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -138,6 +144,8 @@ class Analysis:
         )
 
 
+UNLIKELY = ("no-sand", "no-packing", "impossible-permeability", "outside-the-box")
+"""Kinds of warnings that a wrong unit of length leads to; `analyse` says them aloud."""
 APART = 1.25
 """Ratio of two laws' permeabilities from which a warning says that they differ."""
 
@@ -162,22 +170,29 @@ def laws_apart(taken: tuple[str, float], other: tuple[str, float]) -> Iterator[s
 
 @with_visible_choices
 def analyse(
-    spheres: Snapshot,
+    spheres: Snapshot | tuple[Any, ...],
     damaged: Snapshot | None = None,
     *,
     periodic: Directions | None = None,
+    axis: str = "x",
     options: AnalysisChoices | None = None,
     **choices: Unpack[AnalysisKeys],
 ) -> Analysis:
-    """Permeability of a pack of grains along x, without and with the fines in it.
+    """Permeability of a pack of grains, without and with the fines in it.
+
+    `fdnet.permeability` is shorter for spheres in plain arrays.
 
     Args:
-        spheres: grains and fines, m. When `damaged` is given, its grains before the invasion.
+        spheres: grains and fines, or grains as arrays (points, radii) or (points, radii, box), m.
+            When `damaged` is given, its grains before the invasion.
         damaged: the same grains, moved or not, and all fines. Without it, `spheres` holds the
             fines, or there are none.
-        periodic: sides that repeat, letters such as "yz" or three truth values (x, y, z). The
-            other sides of the box are walls; along x they are the inlet and the outlet. Without
-            it, the sides that the file of the spheres gives, as a dump does, else walls.
+        periodic: sides that repeat: letters such as "yz", three truth values (x, y, z), or one
+            for all. The other sides of the box are walls; along the flow they are the inlet and
+            the outlet. Without it, the sides that the spheres know, as those of a dump do, else
+            walls.
+        axis: direction of the flow, "x", "y" or "z". The result has it as its x, as
+            `Snapshot.turned` does.
         options: choices of the analysis, for example `case.analysis`. Without it: one section,
             profile bins of a mean grain radius, fdnet's default laws.
         choices: single choices by name, in place of those of `options`: `sections` (a count, or
@@ -187,11 +202,12 @@ def analyse(
 
     Returns:
         Permeabilities (m2), porosities, sections, profile, network and flows. No open path is no
-        error: the permeability is 0 and `warnings` gives the reason.
+        error: the permeability is 0 and `warnings` gives the reason. A number that no sand has is
+        also a warning of Python's: the unit of length is probably another one.
 
     Raises:
         CaseError: a choice is unknown or outside its range (the message names its key), or
-            `spheres` is no Snapshot.
+            `spheres` are neither a Snapshot nor arrays.
         NetworkError: the geometry is degenerate, or the grains of the two snapshots differ.
         FlowError: the solve fails its checks.
 
@@ -206,23 +222,34 @@ def analyse(
         >>> print(f"{result.k_initial:.2g} m2, porosity {result.porosity_initial:.3f}")
         2.5e-09 m2, porosity 0.476
 
-        Flow along y: turn the spheres so that y becomes the new x; `periodic` turns with them.
+        Flow along y, from plain arrays:
 
-        >>> turned = fdnet.analyse(spheres.turned("y"), periodic="xyz")
+        >>> turned = fdnet.analyse((lattice, 0.5e-3, [3e-3] * 3), periodic=True, axis="y")
         >>> print(f"{turned.k_initial:.2g} m2")
         2.5e-09 m2
     """
     chosen = _chosen(options, choices)
     pair = (chosen.law, chosen.damage_law)
-    return next(compare(spheres, damaged, periodic=periodic, options=chosen, laws=[pair]))
+    more: dict[str, Any] = {"periodic": periodic, "axis": axis, "options": chosen}
+    result = next(compare(spheres, damaged, laws=[pair], **more))
+    _say_aloud(result)
+    return result
+
+
+def _say_aloud(result: Analysis) -> None:
+    """What is unlikely about a result as warnings of Python's, at the line that asked for it."""
+    for one in result.warnings:
+        if isinstance(one, Doubt) and one.kind in UNLIKELY:
+            warnings.warn(explained(one), stacklevel=3)
 
 
 @with_visible_choices
 def compare(
-    spheres: Snapshot,
+    spheres: Snapshot | tuple[Any, ...],
     damaged: Snapshot | None = None,
     *,
     periodic: Directions | None = None,
+    axis: str = "x",
     laws: Sequence[tuple[str, str]] | None = None,
     options: AnalysisChoices | None = None,
     **choices: Unpack[AnalysisKeys],
@@ -236,6 +263,7 @@ def compare(
         spheres: grains and fines, m, as for `analyse`.
         damaged: as for `analyse`.
         periodic: sides that repeat, as for `analyse`.
+        axis: direction of the flow, as for `analyse`.
         laws: pairs (law, damage law). Without it every law with every damage law, or with the
             chosen one where there are no fines.
         options: choices of the analysis, as for `analyse`.
@@ -258,8 +286,13 @@ def compare(
         thesis: 1.4e-09 m2
         lubrication: 2.5e-09 m2
     """
-    require_snapshots(spheres, damaged)
-    base, around = _chosen(options, choices), sides_of(spheres, periodic)
+    base, spheres = _chosen(options, choices), as_snapshot(spheres)
+    damaged = None if damaged is None else as_snapshot(damaged, "damaged")
+    around = sides_of(spheres, periodic)
+    if axis != "x":
+        spheres = replace(spheres, periodic=around).turned(axis)
+        around = sides_of(spheres, None)
+        damaged = None if damaged is None else damaged.turned(axis)
     if damaged is None and len(spheres.fines()):
         damaged = spheres
     if laws is None:
@@ -271,6 +304,169 @@ def compare(
     for one in chosen:
         yield _analysis(measured, one, log)
         log = Log()
+
+
+# ------------------------------------------------------------------------------------------------
+# One call for spheres in plain arrays.
+
+
+THINNEST = 1e-3
+"""Least volume of spheres over that of their box that is no slip of units."""
+
+
+_DIGITS: Any = {"index": False, "float_format": "{:.4g}".format}
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
+class Permeability:
+    """What `fdnet.permeability` returns: numbers of a pack, along one axis or all three.
+
+    Where all axes were asked for, permeabilities are arrays (3,) along x, y and z.
+
+    Attributes:
+        axis: "x", "y", "z" or "all".
+        k_m2: permeability with the fines, m2.
+        k_initial_m2: permeability without them, m2.
+        porosity: with the fines, overlap counted once.
+        porosity_initial: the same without them.
+        law: name of the conductance law.
+        damage_law: name of the damage law that was used; None without fines.
+        sections: slabs across the flow, columns as in sections.csv; for all axes also `axis`.
+        warnings: doubts about the numbers, each with what follows and what to do.
+    """
+
+    axis: str
+    k_m2: float | Array
+    k_initial_m2: float | Array
+    porosity: float
+    porosity_initial: float
+    law: str
+    damage_law: str | None
+    sections: "pd.DataFrame"
+    warnings: tuple[str, ...]
+
+    @property
+    def k_mD(self) -> float | Array:
+        """Permeability with the fines, mD."""
+        return self.k_m2 / M2_PER_MD
+
+    def to_dict(self) -> dict[str, Any]:
+        """All numbers as JSON knows them; the sections are a list of rows."""
+        own = {one.name: getattr(self, one.name) for one in fields(self)} | {"k_mD": self.k_mD}
+        own |= {"warnings": [*self.warnings], "sections": self.sections.to_dict("records")}
+        return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in own.items()}
+
+    def to_frame(self) -> "pd.DataFrame":
+        """A row for each axis: permeabilities (m2 and mD) and porosities."""
+        import pandas as pd
+
+        names = ("k_m2", "k_mD", "k_initial_m2", "porosity", "porosity_initial")
+        axes = list("xyz" if self.axis == "all" else self.axis)
+        return pd.DataFrame({"axis": axes, **{name: getattr(self, name) for name in names}})
+
+    def __str__(self) -> str:
+        said = [f"warning: {one}" for one in self.warnings]
+        return "\n".join([self._shown().to_string(**_DIGITS), *said])
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        said = "".join(f"<p>Warning: {escape(one)}</p>" for one in self.warnings)
+        return self._shown().to_html(**_DIGITS) + said
+
+    def _shown(self) -> "pd.DataFrame":
+        frame = self.to_frame()
+        twice = [] if self.damage_law else ["k_initial_m2", "porosity_initial"]
+        return frame.drop(columns=twice)
+
+
+@with_visible_choices
+def permeability(
+    points: Any,
+    radii: Any,
+    box: Any,
+    *,
+    periodic: Directions = "xyz",
+    axis: str = "x",
+    units: str = "mm",
+    kind: Any = None,
+    **choices: Unpack[AnalysisKeys],
+) -> Permeability:
+    """Permeability of spheres in plain arrays; `fdnet permeability` gives the same of a file.
+
+    Args:
+        points: (N, 3) centres.
+        radii: (N,) radii, or one for all.
+        box: its three lengths from 0 on, (3, 2) bounds, six numbers x0, x1, y0, y1, z0, z1, or a
+            (3, 3) cell whose sides lie along x, y and z, as ASE has it.
+        periodic: sides that repeat: letters, True for all, or three truth values, as ASE's `pbc`.
+            The other sides are walls, along the flow the inlet and the outlet.
+        axis: direction of the flow, "x", "y" or "z", or "all" for the three.
+        units: unit of points, radii and box: "m", "cm", "mm" or "um".
+        kind: "grain" or "fine" of each sphere, (N,). Without it all are grains.
+        choices: of the analysis, as for `analyse`: `sections`, `law`, `damage_law`, `walls` ...
+
+    Returns:
+        Permeability in m2 and mD, porosity, sections and warnings.
+
+    Raises:
+        CaseError: an argument cannot be used, or box and spheres cannot be in one unit.
+        NetworkError, FlowError: as `analyse`.
+
+    Examples:
+        Touching spheres of 1 mm on a simple cubic lattice (k = 0.00252 d^2, Zick and Homsy 1982):
+
+        >>> import fdnet, numpy as np
+        >>> points = np.indices((3, 3, 3)).reshape(3, -1).T + 0.5
+        >>> result = fdnet.permeability(points, 0.5, [3, 3, 3])
+        >>> print(f"{result.k_m2:.3g} m2, {result.k_mD:.0f} mD, porosity {result.porosity:.3f}")
+        2.52e-09 m2, 2551711 mD, porosity 0.476
+        >>> fdnet.permeability(points, 0.5, [3, 3, 3], axis="all").to_frame().axis.tolist()
+        ['x', 'y', 'z']
+    """
+    if box is None:
+        raise CaseError(f"box: missing, expected its three lengths, {units}")
+    given = {"box": box, "periodic": periodic, "units": units}
+    given |= {} if kind is None else {"kind": kind}
+    spheres = Snapshot.from_arrays(points, radii, **given)
+    _refuse_two_units(spheres)
+    chosen, several = AnalysisChoices.of_pack(**choices), axis == "all"
+    pair, results, said, rows = (chosen.law, chosen.damage_law), [], [], []
+    for one in "xyz" if several else [axis]:
+        result = next(compare(spheres.turned(one), options=chosen, laws=[pair]))
+        _say_aloud(result)
+        doubts = [*pack_doubts(spheres, one, chosen.walls), *result.warnings]
+        said += [f"{one}: {text}" if several else text for text in map(explained, doubts)]
+        results.append(result)
+        rows += [({"axis": one} if several else {}) | slab.row() for slab in result.sections]
+    import pandas as pd
+
+    first = results[0]
+    return Permeability(
+        axis=axis,
+        k_m2=frozen([one.k_damaged for one in results]) if several else first.k_damaged,
+        k_initial_m2=frozen([one.k_initial for one in results]) if several else first.k_initial,
+        porosity=first.porosity_damaged,
+        porosity_initial=first.porosity_initial,
+        law=first.law,
+        damage_law=first.damage_law_used,
+        sections=pd.DataFrame(rows),
+        warnings=tuple(said),
+    )
+
+
+def _refuse_two_units(spheres: Snapshot) -> None:
+    """Raise CaseError where the box is far too wide or narrow to be in the spheres' unit."""
+    sides = np.ptp(spheres.box, axis=1)
+    filled = 4 / 3 * np.pi * float(np.sum(spheres.radius**3)) / float(np.prod(sides))
+    narrow = float(sides.max()) < float(spheres.radius.max(initial=0.0))
+    if len(spheres) and (narrow or filled < THINNEST):
+        reach = np.ptp(spheres.position, axis=0) + 2 * spheres.radius.max()
+        wide, span = (" x ".join(f"{1e3 * one:.3g}" for one in it) for it in (sides, reach))
+        raise CaseError(
+            f"box: {wide} mm, but the spheres span {span} mm; expected box, points and radii in "
+            "one unit; convert them and name it with units"
+        )
 
 
 def _chosen(options: AnalysisChoices | None, choices: AnalysisKeys) -> AnalysisChoices:

@@ -19,12 +19,14 @@ from fdnet.network.tessellation.facets import LARGE_CELL, copies_of_cell
 from fdnet.spheres.geometry import (
     Porosity,
     inside_others,
+    max_overlap,
     measure_porosity,
+    overlap_doubts,
     repeated,
     touching_pairs,
     wrapped,
 )
-from fdnet.spheres.snapshot import Array, Kind, Snapshot, one_line
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, one_line, sides_of
 
 CONTACT_GAP = 0.01
 """Spheres this far apart, in diameters of the smaller one, touch."""
@@ -121,6 +123,9 @@ LIKE = 1e-3
 """A fine that is smaller than the smallest grain by less than this share is as large."""
 PRESSED = 0.2
 """Part of its radius by which a grain may reach across a wall: pressed grains do."""
+MANY = 0.25
+"""Part of the spheres that would cross the sides of a periodic pack, above which those that cross
+side walls are reported."""
 GAPS, FEWEST, MISSING, LEAST_SIDE = (0.05, 0.5), 5.0, 0.55, 2.5
 """To find walls at periodic sides: gaps between neighbours, in diameters; the number of neighbours
 across a side, and its share, below which they are missing (packs between walls have 0.1 to 0.35 of
@@ -151,6 +156,38 @@ def wide_fines(grains: Snapshot, fines: Snapshot) -> str:
             "the units of the radii, or which spheres are fines"
         )
     return ""
+
+
+def pack_doubts(spheres: Snapshot, axis: str, walls: str) -> Iterator[str]:
+    """Doubts about spheres from anywhere, with flow along `axis`: walls crossed, and overlaps."""
+    periodic = sides_of(spheres, None)
+    if walls == "no-slip":
+        yield from _crossing(spheres, periodic, axis)
+    seen = spheres.where(~inside_others(spheres, periodic)[0])
+    yield from overlap_doubts(
+        max_overlap(seen.grains(), periodic), max_overlap(seen, periodic, only_fines=True)
+    )
+
+
+def _crossing(spheres: Snapshot, periodic: tuple[bool, bool, bool], axis: str) -> Iterator[str]:
+    """A warning where many spheres reach across the side walls, as those of a periodic pack do."""
+    walls = np.array([not periodic[k] and "xyz"[k] != axis for k in range(3)])
+    reach = spheres.radius[:, None] * (1 - PRESSED)
+    low, high = spheres.box.T
+    beyond = ((spheres.position - reach < low) | (spheres.position + reach > high)) & walls
+    count = int(np.sum(beyond.any(axis=1)))
+    expected = 2.0 * reach.mean() * len(spheres) * np.sum(walls / (high - low))
+    if count > max(MANY * expected, 3):
+        sides = "".join(
+            name
+            for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
+            if crossed or repeats
+        )
+        yield Doubt(
+            "crossing-walls",
+            f"{count} of {len(spheres)} spheres cross the side walls; if the pack is periodic "
+            f"give --periodic {sides}",
+        )
 
 
 def doubts(
@@ -372,16 +409,18 @@ def measure_specimen(
     )
 
 
-def require_snapshots(spheres: object, damaged: object) -> None:
-    """Raise CaseError unless `spheres` is a Snapshot, and `damaged` a Snapshot or None."""
-    for name, value in (("spheres", spheres), ("damaged", damaged)):
-        if not isinstance(value, Snapshot) and (name == "spheres" or value is not None):
-            text = repr(value)
-            raise CaseError(
-                f"{name}: {text if len(text) <= 60 else text[:60] + '...'} is a "
-                f"{type(value).__name__}, expected a Snapshot; read one with fdnet.read_spheres "
-                "from a file, or make one with fdnet.Snapshot.from_arrays"
-            )
+def as_snapshot(spheres: object, name: str = "spheres") -> Snapshot:
+    """The spheres, from arrays in m where they are no Snapshot. Raises CaseError for all else."""
+    if isinstance(spheres, Snapshot):
+        return spheres
+    if isinstance(spheres, tuple) and len(spheres) in (2, 3):
+        return Snapshot.from_arrays(*spheres[:2], box=spheres[2] if len(spheres) > 2 else None)
+    text = repr(spheres)
+    raise CaseError(
+        f"{name}: {text if len(text) <= 60 else text[:60] + '...'} is a "
+        f"{type(spheres).__name__}, expected a Snapshot or (points, radii, box); read one with "
+        "fdnet.read_spheres from a file, or make one with fdnet.Snapshot.from_arrays"
+    )
 
 
 def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iterator[str]:

@@ -59,6 +59,16 @@ def draw(path: Path, fill: Callable[[Any], None]) -> Path:
     return path
 
 
+def shown(fill: Callable[[Any], Any]) -> Any:
+    """A figure of pyplot that `fill` draws into, for notebooks and `plt.show()`; its axes (N,)."""
+    from matplotlib import pyplot, rc_context
+
+    with rc_context(STYLE):
+        figure = pyplot.figure(layout="constrained")
+        fill(figure)
+    return np.array(figure.axes)
+
+
 def stairs(axes: Any, edges: Any, values: Any, **style: Any) -> None:
     """Steps of `values` (N,) between `edges` (N+1,) m, drawn over mm; None and NaN are gaps."""
     drawn = {"linewidth": 2.0, "baseline": None} | style

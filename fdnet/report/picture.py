@@ -7,6 +7,7 @@ input.
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -43,12 +44,14 @@ class Scene:
         box: (3, 2) m.
         title: of the colours of the flow; "" where no flow is shown.
         limits: of these colours.
+        told: whether standard error says how many are drawn.
     """
 
     grains: Path
     box: Array
     title: str = ""
     limits: tuple[float, float] = (0.0, 0.0)
+    told: bool = False
 
 
 def render_spheres_png(
@@ -89,13 +92,15 @@ def draw_frames(
         "title": scene.title,
         "limits": scene.limits,
         "frames": rows,
+        "told": scene.told,
     }
     package = str(Path(__file__).resolve().parents[2])
     before = os.environ.get("PYTHONPATH")
     done = subprocess.run(
         drawing_command(),
         input=json.dumps(work),
-        capture_output=True,
+        stdout=2 if scene.told else subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
         text=True,
         errors="replace",
         timeout=seconds,
@@ -105,7 +110,7 @@ def draw_frames(
     if done.returncode:
         printed = [line.strip() for line in (done.stderr or "").splitlines() if line.strip()]
         kind = "exit code" if done.returncode > 0 else "signal"
-        why = printed[-1][:200] if printed else "no usable OpenGL?"
+        why = re.sub(r".*\|\s*", "", printed[-1])[:200] if printed else "no usable OpenGL?"
         raise OSError(f"the drawing process ended with {kind} {abs(done.returncode)}; {why}")
     for target in targets:
         picture = target.read_bytes() if target.is_file() else b""
@@ -162,8 +167,8 @@ def write_movie(
             late = isinstance(error, subprocess.TimeoutExpired)
             reason = f"the drawing was given up after {seconds:g} s" if late else str(error)
             raise CaseError(
-                f"{target}: not drawn, because {reason}; the set-up installs software OpenGL, and "
-                "invasion.pvd opens in ParaView without it"
+                f"{target}: not drawn, because {reason}; install software OpenGL "
+                "(docs/start/install.md), or open invasion.pvd in ParaView"
             ) from error
         pairs = zip(files, frames, strict=True)
         pictures = [_worded(file, frame.words, above=still) for file, frame in pairs]
@@ -281,7 +286,7 @@ def draw_pictures(work: dict[str, Any]) -> None:
     bounds, still, flow = np.array(work["box"]) * MM, pv.read(work["grains"]), bool(work["title"])
     view = BROADSIDE if flow else OBLIQUE
     colours = {} if flow else colours_of(pv.read(work["frames"][-1][0]), bounds)
-    for spheres, lines, target in work["frames"]:
+    for number, (spheres, lines, target) in enumerate(work["frames"], 1):
         state = pv.read(spheres)
         plotter: Any = pv.Plotter(off_screen=True, window_size=list(view.window))
         plotter.set_background("white")
@@ -306,6 +311,8 @@ def draw_pictures(work: dict[str, Any]) -> None:
         _look(plotter, bounds, view)
         plotter.screenshot(target)
         plotter.close()
+        if work["told"]:
+            print(f"movie: {number} of {len(work['frames'])} states drawn", flush=True)
 
 
 def _balls(spheres: Any, mask: Array, resolution: int) -> Any:

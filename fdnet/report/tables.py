@@ -74,22 +74,9 @@ AGREES = {True: "agrees", False: "disagrees", None: "not decided"}
 FLOAT_FORMAT = "%.9g"
 
 
-_SECTION = (
-    "section",
-    *("x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged"),
-    *("k_initial_m2", "k_damaged_m2", "k_reduction"),
-    *("k_initial_inplace_m2", "k_damaged_inplace_m2", "fines_count", "fines_fraction"),
-)
-"""Columns of sections.csv, named as the attributes of a section with their unit."""
-
-
 def section_rows(analysis: "Analysis") -> list[dict[str, Any]]:
     """The sections as `sections.csv` and `summary.json` name their values."""
-    names = {column: column.removesuffix("_m2").removesuffix("_m") for column in _SECTION}
-    return [
-        {column: getattr(section, name) for column, name in names.items()}
-        for section in analysis.sections
-    ]
+    return [section.row() for section in analysis.sections]
 
 
 def write_rows(path: str | Path, rows: Any) -> Path:

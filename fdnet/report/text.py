@@ -109,6 +109,11 @@ ENDS = {
 def end_words(summary: Mapping[str, Any], control: Run) -> str:
     """Why the invasion ended, as a part of a sentence; the case's `control` has the rules."""
     reason, rate = summary["stop_reason"], summary.get("rate_over_initial")
+    if reason == "unfinished":
+        return (
+            f"the invasion was cut at {percent(summary['share_done'])} % of the steps that it is "
+            "expected to take"
+        )
     if reason != "plugged":
         return ENDS[reason]
     if control.stop_rate is not None and rate is not None and rate <= control.stop_rate:
@@ -168,6 +173,11 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
         two_digits(damage["lost_from"]),
     )
     if summary["final"] is False:
+        if summary["stop_reason"] == "unfinished":
+            return (
+                f"Provisional, at {percent(summary['share_done'])} % of the invasion: so far "
+                f"{p95}. Continue the run with --resume before you use these numbers."
+            )
         cut, more = "the run was cut at its cap", "raise run.cap_ms"
         if summary["stop_reason"] == "mud_cut_off":
             cut, more = "the mud was cut off", "give a longer fines.slab_mm"
@@ -180,8 +190,10 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
     law = f" by the law {_law_of(summary)}" if followed(summary) is not None else ""
     scatter, end = summary["scatter"], summary["sections"][-1]["x_hi_m"]
     spread = scatter["depth_p95_relative"]
+    depth = millimetres(damage["face_depth_m"])
     face = (
-        f"The first {millimetres(damage['face_depth_m'])} lost {two_digits(damage['face_lost'])} "
+        f"The first {'millimetre' if depth == '1 mm' else depth} lost "
+        f"{two_digits(damage['face_lost'])} "
         f"of the permeability{law} (from seed to seed ± {100 * scatter['first_mm_loss']:.2g} "
         f"points), and {p95} (± {two_digits(spread)})."
     )
@@ -192,8 +204,8 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
             "must reach: lengthen the box."
         )
     return (
-        f"{face} Let a perforation, a cut or a wash reach deeper than {millimetres(beyond)}: that "
-        "is this depth with two standard deviations of seeds."
+        f"{face} Let a perforation, a cut or a wash reach deeper than {1e3 * beyond:.2g} mm: that "
+        "is the 95 % depth and two standard deviations of seeds."
     )
 
 

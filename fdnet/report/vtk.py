@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fdnet.errors import CaseError
+from fdnet.errors import VIEW, CaseError
 from fdnet.files import write_bytes, write_text
 from fdnet.report.tables import blocked_throats, pore_porosity
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -21,6 +21,22 @@ if TYPE_CHECKING:
 SPHERE_ARRAYS = {"radius": "radius_m", "kind": "kind", "id": "id", "velocity": "velocity_m_s"}
 """Names of the point data of sphere files, by the attribute of a snapshot."""
 LAW_CODES = {"clean": 0, "deposition": 1, "clogging": 2, "blocked": 3, "sections": 5}
+
+
+def view_missing() -> str:
+    """Why VTK and pyvista cannot be loaded; "" where they can."""
+    try:
+        import pyvista  # noqa: F401
+        from vtkmodules import vtkIOXML  # noqa: F401
+    except ImportError as error:
+        return str(error)
+    return ""
+
+
+def refuse_without_view(what: str) -> None:
+    """Raise CaseError where VTK or pyvista cannot be loaded; `what` is what needs them."""
+    if why := view_missing():
+        raise CaseError(f"{what}: needs VTK, which cannot be loaded ({why}); {VIEW}")
 
 
 def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:
@@ -185,6 +201,7 @@ ROUNDNESS = 16
 
 def read_mesh(path: Path) -> Any:
     """The mesh in a .vtp file, m. Raises CaseError when it is missing, unreadable or empty."""
+    refuse_without_view(str(path))
     import pyvista as pv
 
     if not path.exists():
@@ -204,7 +221,8 @@ def read_mesh(path: Path) -> Any:
 
 def read_balls(path: Path) -> Any:
     """The spheres in a .vtp file as balls, m, with `radius_m`, `kind` and `id` on them."""
+    spheres = read_mesh(path)
     import pyvista as pv
 
     ball = pv.Sphere(radius=1.0, theta_resolution=ROUNDNESS, phi_resolution=ROUNDNESS)
-    return read_mesh(path).glyph(geom=ball, scale="radius_m", orient=False)
+    return spheres.glyph(geom=ball, scale="radius_m", orient=False)

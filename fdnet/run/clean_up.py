@@ -10,7 +10,7 @@ from fdnet.dem.checkpoint import HISTORY, UPDATES, Cleaned, overlap_in, read_his
 from fdnet.dem.clean_up import CleanUpStage, Start, clean_up, fines_inside
 from fdnet.dem.invade_deck import DrivingFluid
 from fdnet.errors import explained
-from fdnet.run.dem_stages import invaded, is_done, packed_grains
+from fdnet.run.dem_stages import invaded, invasion_record, is_done, packed_grains
 from fdnet.run.fluid import Mirrored, fluid_of, mirrored
 from fdnet.run.folder import RECORD_FORMAT, START_OVER, check_files, digests_of
 from fdnet.run.progress import Progress
@@ -31,7 +31,7 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     grains, flow, folder = packed_grains(session), back_flow(case), session.path / STAGE
     start = Start(
         grains=grains,
-        invaded=invaded(session, case, grains).damaged,
+        invaded=invaded(session, case, grains, invasion_record(session, case)).damaged,
         invasion=session.path / "invade",
         digest=case.digest(STAGE),
     )

@@ -1,12 +1,13 @@
 """The stages of a run that need LIGGGHTS: the pack and the invasion."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import read_history, read_updates, state_at
 from fdnet.dem.deck import snapshot_of
-from fdnet.dem.invasion import invade
+from fdnet.dem.invasion import invade, invasion_so_far
 from fdnet.dem.packing import check_radii, make_pack
 from fdnet.errors import CaseError, Doubt
 from fdnet.names import LIGGGHTS_STAGES
@@ -23,7 +24,7 @@ from fdnet.run.records import (
 )
 from fdnet.scales.cost import expected_duration
 from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
-from fdnet.scales.scales import invasion_scales
+from fdnet.scales.scales import InvasionScales, invasion_scales
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
 
@@ -50,20 +51,41 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     if is_done(session, "invade"):
         return
     scales, grains, folder = invasion_scales(case), packed_grains(session), session.path / "invade"
-    step = scales.time_step
-    arrivals = scales.supplied_count * scales.upstream_velocity / scales.slab_length
-    forecast = Forecast(
-        expected=round(expected_duration(case, scales) / step),
-        plug=0 if case.run.duration_s is not None else round(scales.plug_time / step),
-        cap=math.ceil(scales.cap_time / step),
-        allowed=case.run.plug_rate * arrivals * step,
-    )
-    progress = Progress("invade", forecast, show=session.options.show_progress)
+    progress = Progress("invade", _forecast(case, scales), show=session.options.show_progress)
     with session.timed("invade"), progress:
         launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
         result = invade(case, scales, grains, folder, launch, fluid=fluid)
     record = invade_record(case, result, folder, seconds=session.seconds["invade"])
     session.folder.finish("invade", record | {"cpu_seconds": session.cpu_seconds["invade"]})
+
+
+def _forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
+    step = scales.time_step
+    arrivals = scales.supplied_count * scales.upstream_velocity / scales.slab_length
+    return Forecast(
+        expected=round(expected_duration(case, scales) / step),
+        plug=0 if case.run.duration_s is not None else round(scales.plug_time / step),
+        cap=math.ceil(scales.cap_time / step),
+        allowed=case.run.plug_rate * arrivals * step,
+    )
+
+
+def invasion_record(session: Session, case: InvasionCase) -> dict[str, Any]:
+    """The record of the invasion; of one that was cut, what it is at its last whole checkpoint.
+
+    That one has the key `share_done`: steps done over those that it is expected to take. Raises
+    CaseError where there is no whole checkpoint yet.
+    """
+    record = session.folder.record("invade")
+    if record is not None:
+        return record
+    scales, folder = invasion_scales(case), session.path / "invade"
+    result = invasion_so_far(case, scales, packed_grains(session), folder)
+    if result is None:
+        raise CaseError(f"{folder}: has no whole checkpoint yet; go on with --resume")
+    seen = [(row.step, row.invaded + row.passed) for row in result.history]
+    share = seen[-1][0] / _forecast(case, scales).end(seen)
+    return invade_record(case, result, folder, seconds=0.0) | {"share_done": share}
 
 
 def is_done(session: Session, stage: str) -> bool:
@@ -99,21 +121,23 @@ def packed_grains(session: Session) -> Snapshot:
     return grains
 
 
-def invaded(session: Session, case: InvasionCase, grains: Snapshot) -> FinishedInvasion:
-    """The finished invasion, as it is on disk.
+def invaded(
+    session: Session, case: InvasionCase, grains: Snapshot, record: Mapping[str, Any]
+) -> FinishedInvasion:
+    """The invasion of this `record`, as it is on disk.
 
     Raises CaseError when a file is not what the stage made, DumpError or LiggghtsError when one
     cannot be read.
     """
     folder, scales = session.path / "invade", invasion_scales(case)
-    check_files(folder, session.folder.record("invade") or {}, START_OVER, may_lack=may_be_gone)
-    history = read_history(folder)
+    check_files(folder, record, START_OVER, may_lack=may_be_gone)
+    history = tuple(row for row in read_history(folder) if row.step <= record["steps"])
     return FinishedInvasion(
         case=case,
         scales=scales,
         history=history,
         damaged=state_at(folder, history[-1], case, scales, grains),
-        updates=tuple(read_updates(folder)),
+        updates=tuple(row for row in read_updates(folder) if row["step"] < record["steps"]),
     )
 
 

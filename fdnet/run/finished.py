@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from difflib import get_close_matches
+from functools import cached_property, partial
 from html import escape
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
 
 from fdnet.case.case import Case, InvasionCase
@@ -14,9 +16,11 @@ from fdnet.names import ALL_SPHERES
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.states import all_conductances
+from fdnet.report.figures import fill_depth, shown
 from fdnet.report.tables import (
     LAYER_COLUMNS,
     empty_table,
+    millidarcy,
     read_summary,
     read_table,
     to_openpnm,
@@ -45,12 +49,55 @@ class FinishedRun:
         case: the case with every default written out.
         manifest: what made the run: versions, digests, commands, seeds, seconds of each stage.
 
-    `print(run)` shows the result in mD and m2, mm and percent.
+    `print(run)` shows the result in mD and m2, mm and percent. Every key of `summary` is an
+    attribute too, a permeability in mD as well: `run.k_damaged_m2`, `run.k_damaged_mD`,
+    `run.porosity_initial`, `run.stop_reason`, `run.warnings`.
     """
 
     path: Path
     case: Case
     manifest: Mapping[str, Any]
+
+    def __getattr__(self, name: str) -> Any:
+        """A number of the summary by its key; a permeability also in mD."""
+        if name.startswith("_") or name in FinishedRun.__dataclass_fields__:
+            raise AttributeError(name)
+        if name in self.summary:
+            return self.summary[name]
+        in_m2 = f"{name.removesuffix('_mD')}_m2"
+        if name.endswith("_mD") and in_m2 in self.summary:
+            k = self.summary[in_m2]
+            return None if k is None else millidarcy(k)
+        near = get_close_matches(name, dir(self), 1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise AttributeError(f"a run of fdnet has no {name!r}{hint}")
+
+    def __dir__(self) -> list[str]:
+        keys = [*self.summary, *(f"{k[:-3]}_mD" for k in self.summary if k.endswith("_m2"))]
+        return sorted({*super().__dir__(), *keys})
+
+    @property
+    def lost(self) -> float | None:
+        """Share of the permeability that is lost, `k_reduction`; None where k was 0."""
+        return self.summary["k_reduction"]
+
+    def plot(self) -> Any:
+        """Permeability in place (mD) and porosity against depth (mm), as in report.html.
+
+        Returns:
+            The two axes of matplotlib, (2,); `plt.show()` or `plt.savefig(...)` follow.
+        """
+        box = [[0.0, self.case.size_m[0]]]
+        parts: Any = SimpleNamespace(  # named as in an `Analysis`
+            sections=[*_without_units(self.sections).itertuples()],
+            profile=_with_edges(self.profile),
+            layers=_with_edges(self.layers) if len(self.layers) else None,
+            occupancy=self.summary["supplied_count"] or None,
+            porosity_initial=self.summary["porosity_initial"],
+            porosity_damaged=self.summary["porosity_damaged"],
+            network=SimpleNamespace(box=box),
+        )
+        return shown(partial(fill_depth, analysis=parts))
 
     @cached_property
     def summary(self) -> Mapping[str, Any]:
@@ -196,6 +243,16 @@ class FinishedRun:
         return f"<pre>{escape(str(self))}</pre>"
 
 
+def _without_units(table: "pd.DataFrame") -> "pd.DataFrame":
+    return table.rename(columns=lambda name: name.removesuffix("_m2").removesuffix("_m"))
+
+
+def _with_edges(table: "pd.DataFrame") -> SimpleNamespace:
+    """The columns of a table by depth, and the edges (m) of its rows."""
+    columns = {str(name): one.to_numpy() for name, one in _without_units(table).items()}
+    return SimpleNamespace(**columns, edges=[*columns["x_lo"], columns["x_hi"][-1]])
+
+
 def _check_state(state: str) -> None:
     if state not in ("initial", "damaged"):
         raise CaseError(f"state: {state!r}, expected 'initial' (no fines) or 'damaged'")
@@ -208,9 +265,10 @@ def open_run(path: str | Path) -> FinishedRun:
         path: the run folder, for example "runs/quick".
 
     Returns:
-        The run, with `summary` (mapping), `sections`, `profile`, `pores`, `throats` and `history`
-        (pandas, units in the column names, SI), `spheres()`, `network()`, `to_openpnm()`,
-        `network_mesh()`, `sphere_mesh()`. It prints itself in mD and m2, mm and percent.
+        The run, with `summary` (mapping) and its numbers as attributes (`k_damaged_mD`), `plot()`,
+        `sections`, `profile`, `pores`, `throats` and `history` (pandas, units in the column names,
+        SI), `spheres()`, `network()`, `to_openpnm()`, `network_mesh()`, `sphere_mesh()`. It prints
+        itself in mD and m2, mm and percent.
 
     Raises:
         CaseError: there is no folder, it holds no run or an unfinished one, or its records cannot
@@ -219,11 +277,14 @@ def open_run(path: str | Path) -> FinishedRun:
     Examples:
         >>> import fdnet
         >>> run = fdnet.open_run("runs/quick")
-        >>> run.summary["k_damaged_m2"] < run.summary["k_initial_m2"]
+        >>> run.k_damaged_mD < run.k_initial_mD
+        True
+        >>> run.lost == run.summary["k_reduction"]
         True
         >>> list(run.sections.columns[:5])
         ['section', 'x_lo_m', 'x_hi_m', 'porosity_initial', 'porosity_damaged']
-        >>> axes = run.sections.plot(x="x_lo_m", y=["k_initial_m2", "k_damaged_m2"])
+        >>> [axes.get_ylabel() for axes in run.plot()]
+        ['permeability in place (mD)', 'porosity (–)']
     """
     folder = expanded(path)
     manifest, case = finished_manifest(folder)

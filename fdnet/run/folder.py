@@ -16,7 +16,7 @@ from pydantic import Field
 
 from fdnet.case.case import Case, InvasionCase, difference_text
 from fdnet.case.file import recorded_case
-from fdnet.dem.checkpoint import file_digest
+from fdnet.dem.checkpoint import file_digest, read_rows
 from fdnet.errors import CaseError
 from fdnet.files import refuse_folder_name, remove_half_written, write_text
 from fdnet.names import LIGGGHTS_STAGES, STAGES
@@ -444,7 +444,8 @@ def open_folder(
 
     case.toml is written when anything is left to run.
 
-    Raises CaseError, with nothing changed, when one of `stages` lacks the stage before it, when
+    Raises CaseError, with nothing changed, when one of `stages` lacks the stage before it (with
+    `resume` an analysis takes a cut invasion as it is), when
     another run is writing there, when the folder holds another case or an unfinished run and
     neither `resume` nor `force` is set, or when it holds something that is not a run.
     """
@@ -464,7 +465,15 @@ def open_folder(
         "invade": "invade" in case.stages and (analysed or (cleaned and "clean_up" in stages)),
         "clean_up": cleaned and analysed,
     }
+    so_far = (  # a cut invasion is analysed as it is
+        resume
+        and "clean_up" not in stages
+        and not (path / RECORDS["invade"]).exists()
+        and bool(read_rows(path / "invade"))
+    )
     for stage, what in (("pack", "pack"), ("invade", "invasion"), ("clean_up", "clean-up")):
+        if so_far and stage != "pack":
+            continue
         if needed[stage] and stage not in stages and not (path / RECORDS[stage]).exists():
             raise CaseError(
                 f"{path}: no finished {what} here; run the stage {stage} first "

@@ -1,6 +1,7 @@
 """Movies and pictures of a finished run: its fines, the flux of its throats, or streamlines."""
 
 import shlex
+import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -18,7 +19,12 @@ from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.network.specimen import cake_of
 from fdnet.report.picture import MovieFrame, Scene, refuse_suffix, write_movie
-from fdnet.report.vtk import write_flux_vtp, write_lines_vtp, write_spheres_vtp
+from fdnet.report.vtk import (
+    refuse_without_view,
+    write_flux_vtp,
+    write_lines_vtp,
+    write_spheres_vtp,
+)
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import ANALYSE_AGAIN, check_finished, check_one, frames_in, frames_of
 from fdnet.spheres.geometry import wrapped
@@ -187,13 +193,15 @@ def movie_of(
     per_second: float = 4.0,
     show: str = "fines",
     force: bool = False,
+    progress: bool = False,
 ) -> Path:
     """Write the invasion of the run in `folder` as a movie; returns its path.
 
     `target` ends in .gif or .mp4 and is invasion.gif in the run folder without it. With .png it is
-    one picture of the specimen before and after. `show` is a key of `SHOWN`. Raises CaseError
-    where the folder is no finished run with fines and frames, one of its files was changed, a
-    file is there that `force` does not allow to replace, or nothing can be drawn.
+    one picture of the specimen before and after. `show` is a key of `SHOWN`. With `progress`,
+    standard error says how far the drawing is. Raises CaseError where the folder is no finished
+    run with fines and frames, one of its files was changed, a file is there that `force` does not
+    allow to replace, VTK is missing, or nothing can be drawn.
     """
     if not LEAST <= per_second <= MOST:
         raise CaseError(f"--fps: {per_second:g}, expected {LEAST:g} to {MOST:g} frames a second")
@@ -203,6 +211,7 @@ def movie_of(
     path = target or run.path / "invasion.gif"
     refuse_suffix(path)
     refuse_present(path, force=force)
+    refuse_without_view(str(path))
     check_finished(folder)
     moments = list(moments_of(run))
     if path.suffix.lower() == ".png":
@@ -219,6 +228,8 @@ def movie_of(
             if flow_of is None:
                 frames.append(MovieFrame(spheres, one.words()))
                 continue
+            if progress:
+                print(f"movie: flow of state {number + 1} of {len(moments)}", file=sys.stderr)
             flow = flow_of(
                 read_spheres(spheres, box=box).fines() if one.spheres else none, one.rate
             )
@@ -226,7 +237,7 @@ def movie_of(
             lines = Path(work, f"lines_{number:04d}.vtp")
             flow.write(lines)
             frames.append(MovieFrame(spheres, one.words(flow.k_over_k0), lines))
-        scene = Scene(grains=still, box=box, title=SHOWN[show], limits=limits)
+        scene = Scene(grains=still, box=box, title=SHOWN[show], limits=limits, told=progress)
         return write_movie(path, frames, scene, per_second=per_second)
 
 

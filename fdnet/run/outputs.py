@@ -14,6 +14,7 @@ from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
 from fdnet.dem.checkpoint import readable_states
 from fdnet.dem.supply import batches_of, drawn_fines
+from fdnet.errors import Doubt
 from fdnet.report import figures, tables, vtk
 from fdnet.report.figures import Added, PageTable, PlacedSizes
 from fdnet.report.picture import render_spheres_png
@@ -97,11 +98,15 @@ def write_tables(results: Results) -> None:
         tables.write_rows(path / "history.csv", results.history_rows)
 
 
-def write_paraview(results: Results) -> None:
+def write_paraview(results: Results) -> list[str]:
     """network.vtp, the spheres before and after, and the invasion for ParaView's time slider.
 
     Of the invasion there are at most `MOST_FRAMES` evenly spaced states, the last among them.
+    Without VTK nothing is written, and the list that is returned says why.
     """
+    if why := vtk.view_missing():
+        words = f"no 3-D picture and no ParaView files, because VTK cannot be loaded ({why})"
+        return [Doubt("no-view", words)]
     path, shown, one = results.path, results.shown, results.invasion
     vtk.write_network_vtp(path / "network.vtp", results.analysis)
     vtk.write_spheres_vtp(path / "spheres_initial.vtp", results.grains)
@@ -121,23 +126,27 @@ def write_paraview(results: Results) -> None:
             entries.append((state.time_s, name))
         vtk.write_pvd(path / "invasion.pvd", entries)
     vtk.write_macro(path / "paraview_view.py")
+    return []
 
 
-def draw_figures(results: Results) -> tuple[list[tuple[Path, str]], list[str]]:
+def draw_figures(
+    results: Results, *, solid: bool = True
+) -> tuple[list[tuple[Path, str]], list[str]]:
     """All figures with their captions, and why the 3-D picture is missing if it is.
 
-    The 3-D picture is drawn by a process of its own at the same time as the others.
+    The 3-D picture is drawn from a ParaView file by a process of its own at the same time as the
+    others, where `solid` asks for it.
     """
     folder, spheres = results.path / "figures", results.path / "spheres_damaged.vtp"
     rows, picture = results.history_rows or None, folder / "spheres_3d.png"
     folder.mkdir(exist_ok=True)
     with ThreadPoolExecutor(1) as aside:
-        waiting = aside.submit(render_spheres_png, picture, spheres, results.shown.box)
+        box = results.shown.box
+        waiting = aside.submit(render_spheres_png, picture, spheres, box) if solid else None
         drawn = figures.draw_all(folder, results.analysis, results.shown, rows, results.sizes)
-        reason = waiting.result()
-    captioned = [
-        (file, figures.CAPTIONS[file.stem]) for file in ([] if reason else [picture]) + drawn
-    ]
+        reason = waiting.result() if waiting else ""
+    first = [picture] if solid and not reason else []
+    captioned = [(file, figures.CAPTIONS[file.stem]) for file in first + drawn]
     for one in results.added:
         if one.fill is not None:
             captioned.append((figures.draw(folder / f"{one.name}.svg", one.fill), one.caption))

@@ -22,7 +22,14 @@ from fdnet.report import html, tables
 from fdnet.report.text import case_words, thesis_law_warning
 from fdnet.run.answer import with_answer
 from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
-from fdnet.run.dem_stages import file_warnings, invade_stage, invaded, pack_stage, packed_grains
+from fdnet.run.dem_stages import (
+    file_warnings,
+    invade_stage,
+    invaded,
+    invasion_record,
+    pack_stage,
+    packed_grains,
+)
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import (
     MESHES,
@@ -228,6 +235,8 @@ def _carry_out(session: Session) -> dict[str, Any]:
     stages = session.options.stages
     if session.folder.manifest() is not None:
         session.folder.clear(tuple(stage for stage in ("analyse", "report") if stage in stages))
+    else:  # a provisional analysis may be there
+        session.folder.clear(("analyse", "report"))
     analysed = bool({"analyse", "report"} & set(stages))
     sides = "".join(axis for axis, yes in zip("xyz", session.case.periodic, strict=True) if yes)
     free = cores() > session.options.ranks
@@ -246,7 +255,8 @@ def _carry_out(session: Session) -> dict[str, Any]:
     if record is None:
         raise CaseError(f"{session.path}: no finished pack here; run the stage pack first")
     summary = _analyse_and_report(session, record)
-    session.folder.complete(_manifest(session, record))
+    if session.folder.record("invade") is not None or not isinstance(session.case, InvasionCase):
+        session.folder.complete(_manifest(session, record))
     return summary
 
 
@@ -277,20 +287,21 @@ def _manifest(session: Session, pack: dict[str, Any]) -> dict[str, Any]:
 
 def _analyse_and_report(session: Session, pack: dict[str, Any]) -> dict[str, Any]:
     """Tables and the summary, which is given out before figures and report are made of them."""
-    invasion, cleaned = session.folder.record("invade"), _clean_up_record(session)
+    case, cleaned = session.case, _clean_up_record(session)
+    invasion = invasion_record(session, case) if isinstance(case, InvasionCase) else None
     with session.timed("analyse"):
-        results = with_added(_analysed(session, (invasion or {}).get("supplied", 0)), cleaned)
+        results = with_added(_analysed(session, invasion, returns=cleaned is not None), cleaned)
         write_tables(results)
-    summary = _summary(session, results, pack, invasion if results.invasion else None, cleaned)
+    summary = _summary(session, results, pack, invasion, cleaned)
     stages = (pack, invasion, cleaned)
     summary |= stage_costs(stages, session.cpu_seconds)
     summary = tables.write_summary(session.path / "summary.json", summary)
     session.options.answered(summary)
     if "report" in session.options.stages:
         with session.timed("report"):
-            write_paraview(results)
-            figures, notes = draw_figures(results)
-        summary["warnings"] += [explained(note) for note in notes]
+            lacking = write_paraview(results)
+            figures, notes = draw_figures(results, solid=not lacking)
+        summary["warnings"] += [explained(note) for note in lacking + notes]
         summary["seconds"] |= {"report": session.seconds["report"]}
         summary |= stage_costs(stages, session.cpu_seconds)
         tables.write_summary(session.path / "summary.json", summary)
@@ -298,16 +309,18 @@ def _analyse_and_report(session: Session, pack: dict[str, Any]) -> dict[str, Any
     return summary
 
 
-def _analysed(session: Session, supplied: int) -> Results:
-    """The specimen before, after the invasion and after a clean-up; `supplied` fines entered."""
+def _analysed(session: Session, record: dict[str, Any] | None, *, returns: bool) -> Results:
+    """The specimen before, after the invasion of this `record`, and after its clean-up if any."""
     from fdnet.network.permeability import analyse
 
     case, grains = session.case, packed_grains(session)
-    invasion = invaded(session, case, grains) if isinstance(case, InvasionCase) else None
+    invasion = None
+    if record is not None and isinstance(case, InvasionCase):
+        invasion = invaded(session, case, grains, record)
     damaged = None if invasion is None else invasion.damaged
     first = with_default_laws(grains, damaged, periodic=case.periodic, options=case.analysis)
     after: Returned | None = None
-    if damaged is not None and isinstance(case, InvasionCase) and "clean_up" in case.stages:
+    if damaged is not None and isinstance(case, InvasionCase) and returns:
         state = returned(session, case, grains)
         options = case.analysis.changed(damage_law=first.damage_law_used)
         again = analyse(grains, state, periodic=case.periodic, options=options)
@@ -317,7 +330,7 @@ def _analysed(session: Session, supplied: int) -> Results:
         grains=grains,
         invasion=invasion,
         analysis=first,
-        sizes=tuple(placed_sizes(case, grains, damaged, supplied)),
+        sizes=tuple(placed_sizes(case, grains, damaged, record["supplied"] if record else 0)),
         cleaned=after,
     )
 

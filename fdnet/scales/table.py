@@ -1,4 +1,4 @@
-"""The table of scales that `fdnet render` prints; its words are in `table.csv`."""
+"""The table of scales that `fdnet run --dry-run` prints; its words are in `table.csv`."""
 
 import csv
 from collections.abc import Iterator

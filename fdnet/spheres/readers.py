@@ -19,23 +19,17 @@ import numpy as np
 from fdnet.errors import CaseError, DumpError
 from fdnet.files import LARGE, MARKS, expanded, file_bytes, replacing, text_of, unzipped
 from fdnet.spheres.dump import DumpReader, Head
-from fdnet.spheres.rows import (
-    UNITS,
-    Columns,
-    SphereRows,
-    columns_of,
-    metres_per,
-    rows_from,
-    scale_of,
-)
+from fdnet.spheres.rows import Columns, SphereRows, columns_of, rows_from, scale_of
 from fdnet.spheres.snapshot import (
     KIND_NAMES,
+    UNITS,
     Array,
     Directions,
     Kind,
     Snapshot,
     checked_box,
     grain_box,
+    metres_per,
     periodic_axes,
 )
 
@@ -360,8 +354,8 @@ def read_spheres(
         path: the file.
         units: unit of its lengths: "m", "cm", "mm" or "um". CSV columns without a unit need it; a
             dump or VTK file is in m without it, unless the dump names its units.
-        box: (3, 2) bounds of the specimen, or x0, x1, y0, y1, z0, z1, in the unit of the file.
-            Without it the box of the dump, or the box around all grains.
+        box: the specimen, in the unit of the file, as `Snapshot.from_arrays` takes it. Without it
+            the box of the dump, or the box around all grains.
         fines_below: spheres of a smaller radius are fines, in the unit of the file.
         types: which atom types are "grain" and which "fine", for example {1: "grain", 3: "fine"}.
             Without it type 1 is a grain and type 2 a fine, as in fdnet's own dumps.

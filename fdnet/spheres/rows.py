@@ -9,10 +9,16 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.spheres.snapshot import KIND_NAMES, Array, Kind, frozen, one_line
+from fdnet.spheres.snapshot import (
+    KIND_NAMES,
+    UNITS,
+    Array,
+    Kind,
+    frozen,
+    metres_per,
+    one_line,
+)
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
-"""Metres in each unit of length that a file may be in."""
 PLACES = tuple(tuple(f"{axis}{end}" for axis in "xyz") for end in ("", "u", "s", "su"))
 PLACES += (("points:0", "points:1", "points:2"),)
 """Columns of the centres: as they are, unwrapped across periods, both in parts of the box, and as
@@ -228,10 +234,3 @@ def _refuse(
         raise CaseError(
             f"{where(rows[0])}: {name.strip()} is {values[rows[0]]:g}, expected {expected}"
         )
-
-
-def metres_per(units: str) -> float:
-    """Metres in one of `units`. Raises CaseError on an unknown unit."""
-    if units not in UNITS:
-        raise CaseError(f"units {units!r}: expected one of {', '.join(UNITS)}")
-    return UNITS[units]

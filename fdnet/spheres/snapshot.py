@@ -14,6 +14,8 @@ from fdnet.errors import CaseError
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
+SKEWED = 1e-9
+"""Most that a cell may lean, over its longest side, and still count as right-angled."""
 MOST_SHOWN = 60
 """Longest text of one field in `one_line`, characters."""
 
@@ -43,18 +45,31 @@ def _short(value: Any) -> str:
 
 
 # ------------------------------------------------------------------------------------------------
-# The axes x, y, z, given by letters or as three truth values.
+# Units of length, and the axes x, y, z, given by letters or as truth values.
 
 
-Directions = str | Sequence[bool]
-"""Some of the three axes: letters such as "yz", or three truth values (x, y, z)."""
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+"""Metres in each unit of length that spheres may be given in."""
+
+
+def metres_per(units: str) -> float:
+    """Metres in one of `UNITS`. Raises CaseError on an unknown unit."""
+    if units not in UNITS:
+        raise CaseError(f"units {units!r}: expected one of {', '.join(UNITS)}")
+    return UNITS[units]
+
+
+Directions = str | bool | Sequence[bool]
+"""Some of the three axes: letters such as "yz", three truth values (x, y, z), or one for all."""
 
 
 def periodic_axes(periodic: Directions) -> tuple[bool, bool, bool]:
-    """Which of x, y, z are periodic, from letters ("yz", "" for none) or three truth values.
+    """Which of x, y, z are periodic, from letters ("yz", "" for none) or truth values.
 
     Raises CaseError on other letters, on a repeated letter and on another number of values.
     """
+    if isinstance(periodic, bool | np.bool_):
+        return (bool(periodic),) * 3
     if isinstance(periodic, str):
         if not set(periodic) <= set("xyz") or len(set(periodic)) != len(periodic):
             raise CaseError(
@@ -64,8 +79,8 @@ def periodic_axes(periodic: Directions) -> tuple[bool, bool, bool]:
     values = tuple(periodic) if isinstance(periodic, Iterable) else ()
     if len(values) != 3 or not all(isinstance(value, bool | np.bool_) for value in values):
         raise CaseError(
-            f"periodic: {periodic!r}, expected letters such as 'yz', or three truth values for x, "
-            "y, z"
+            f"periodic: {periodic!r}, expected letters such as 'yz', or truth values: one, or "
+            "three for x, y, z"
         )
     return bool(values[0]), bool(values[1]), bool(values[2])
 
@@ -123,10 +138,10 @@ class Snapshot:
         Four grains of 0.25 mm and a fine of 50 um between them:
 
         >>> import fdnet
-        >>> places = [[0, 0, 0], [5e-4, 0, 0], [0, 5e-4, 0], [0, 0, 5e-4], [1.6e-4] * 3]
-        >>> radii = [2.5e-4] * 4 + [5e-5]
+        >>> places = [[0, 0, 0], [0.5, 0, 0], [0, 0.5, 0], [0, 0, 0.5], [0.16] * 3]
+        >>> radii = [0.25] * 4 + [0.05]
         >>> kinds = ["grain"] * 4 + ["fine"]
-        >>> spheres = fdnet.Snapshot.from_arrays(places, radii, kind=kinds)
+        >>> spheres = fdnet.Snapshot.from_arrays(places, radii, kind=kinds, units="mm")
         >>> spheres
         Snapshot(4 grains, 1 fine, step 0, box 1 x 1 x 1 mm)
         >>> spheres.fines().radius.tolist()
@@ -183,29 +198,40 @@ class Snapshot:
         *,
         box: Any = None,
         kind: Any = Kind.GRAIN,
+        periodic: Directions | None = None,
+        units: str = "m",
     ) -> "Snapshot":
         """Spheres at rest from plain arrays, at step 0 and numbered from 1.
 
         Args:
-            position: (N, 3) centres, m.
-            radius: (N,) radii, m, or one for all.
-            box: (3, 2) lower and upper bounds of the specimen, or the six numbers
-                x0, x1, y0, y1, z0, z1, m. Without it, the box around all grains.
+            position: (N, 3) centres.
+            radius: (N,) radii, or one for all.
+            box: the specimen: its three lengths from 0 on, (3, 2) lower and upper bounds, the six
+                numbers x0, x1, y0, y1, z0, z1, or a (3, 3) cell whose sides lie along x, y and z,
+                as ASE has it. Without it, the box around all grains.
             kind: "grain" or "fine", a `Kind`, or (N,) of either.
+            periodic: sides that repeat, as for `fdnet.analyse`; ASE's `pbc` as well.
+            units: unit of all lengths given: "m", "cm", "mm" or "um".
+
+        Returns:
+            The spheres in SI units.
 
         Raises:
-            CaseError: shapes disagree, a value is not finite, a radius is not above 0, a kind is
-                unknown, or there is neither a box nor a grain.
+            CaseError: shapes disagree, a value is not finite, a radius is not above 0, a kind or a
+                unit is unknown, the cell is skewed, or there is neither a box nor a grain.
         """
-        place = np.asarray(position, dtype=float)
+        scale, place = metres_per(units), np.asarray(position, dtype=float)
         if place.ndim != 2 or place.shape[1] != 3:
             raise CaseError(f"position has shape {place.shape}, expected (N, 3)")
         count = len(place)
         radii, kinds = _for_each(radius, count, "radius"), _for_each(_kinds(kind), count, "kind")
         if np.any(~(radii > 0)):
-            raise CaseError(f"radius holds {radii[~(radii > 0)][0]}, expected numbers above 0, m")
+            bad = radii[~(radii > 0)][0]
+            raise CaseError(f"radius holds {bad}, expected numbers above 0, {units}")
         bounds = grain_box(place, radii, kinds) if box is None else checked_box(box)
-        return resting(place, radii, bounds, kinds)
+        sides = None if periodic is None else periodic_axes(periodic)
+        made = resting(scale * place, scale * radii, scale * bounds, kinds)
+        return replace(made, periodic=sides)
 
     def turned(self, axis: str) -> "Snapshot":
         """The same spheres with `axis` ("x", "y" or "z") as the new x.
@@ -291,19 +317,33 @@ def _kinds(kind: Any) -> Array:
 
 
 def checked_box(box: Any) -> Array:
-    """(3, 2) bounds. Raises CaseError unless they are six finite numbers, the lower ones first."""
+    """(3, 2) bounds of a box, from them, from six numbers, three lengths or a (3, 3) cell.
+
+    Raises CaseError unless they are finite numbers, the lower ones first, and the sides of a cell
+    lie along x, y and z.
+    """
     try:
         bounds = np.asarray(box, dtype=float)
     except (TypeError, ValueError):
         bounds = np.empty(0)
+    if bounds.shape == (3, 3):
+        skewed = bounds - np.diag(np.diag(bounds))
+        if np.max(np.abs(skewed)) > SKEWED * np.max(np.abs(bounds)):
+            raise CaseError(
+                f"box: the cell {bounds.tolist()} is skewed (triclinic), expected sides along x, "
+                "y and z; repeat or cut the pack so that it fills a right-angled box"
+            )
+        bounds = np.diag(bounds)
+    if bounds.shape == (3,):
+        bounds = np.column_stack([np.zeros(3), bounds])
     if (
         bounds.shape not in ((3, 2), (6,))
         or not np.all(np.isfinite(bounds))
         or np.any(np.diff(bounds.reshape(3, 2)) <= 0)
     ):
         raise CaseError(
-            f"box: {box!r}, expected six numbers x0,x1,y0,y1,z0,z1 with each lower bound below "
-            "the upper"
+            f"box: {box!r}, expected three lengths above 0, or six numbers x0,x1,y0,y1,z0,z1 with "
+            "each lower bound below the upper"
         )
     return bounds.reshape(3, 2)
 

@@ -9,12 +9,13 @@ import re
 import subprocess
 import sys
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fdnet.errors import CaseError
+from fdnet.errors import VIEW, CaseError
 from fdnet.spheres.rows import PLACES, RADII, SphereRows, columns_of, named, rows_from, scale_of
 from fdnet.spheres.snapshot import Array
 
@@ -84,6 +85,8 @@ def _read_apart(data: bytes, source: str) -> dict[str, Array]:
                 "legacy .vtk file"
             )
         reader = _XML_READERS[kind[1]]
+    if find_spec("vtkmodules") is None:
+        raise CaseError(f"{source}: needs VTK, which is not installed; {VIEW}, or give a table")
     root = str(Path(__file__).resolve().parents[2])
     paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
     with tempfile.TemporaryDirectory() as folder:

@@ -3,11 +3,14 @@
 import math
 
 import pytest
-from campaign.samples import compared
+from builders import tiny
+from campaign.samples import compared, finished_run
 
+import fdnet
 from fdnet.statistics.bands import seeds_for_width
 from fdnet.statistics.differences import holm
 
+IN_PLACE = ("k_initial_inplace_m2", "k_damaged_inplace_m2")
 DRUG_1 = [0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0]
 DRUG_2 = [1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4]
 """Hours of sleep gained by ten patients with each of two drugs (Student 1908)."""
@@ -137,6 +140,47 @@ def test_one_variant_is_not_ranked(tmp_path):
     assert "Result" in page
     assert "Rank" not in page
     assert "best first" not in page
+
+
+def test_runs_open_as_one_object_with_bands_by_quantity_and_by_depth(tmp_path):
+    """t(2) = 4.302653 of any table; the spread of 1, 2, 3 is 1."""
+    half = 4.302653 / math.sqrt(3)
+    names = ("section", "x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged", "k_initial_m2")
+    names += ("k_damaged_m2", "k_reduction", "fines_count", *IN_PLACE)
+    for seed in (1, 2, 3):
+        k = (1e-11, seed * 1e-11, 0.5, 4, 1e-11, seed * 1e-11)
+        edges = ((1, 0.0, 1e-3), (2, 1e-3, 2e-3))
+        rows = [dict(zip(names, (*own, 0.4, 0.3, *k), strict=True)) for own in edges]
+        finished_run(tmp_path / f"r{seed}", tiny(f"seed={seed}"), skin=float(seed), sections=rows)
+    runs = fdnet.open_runs(tmp_path)
+    assert runs.mean["skin"] == 2.0
+    row = runs.band.loc["skin"]
+    assert [*row] == pytest.approx([2, 2 - half, 2 + half, 3], rel=1e-6)
+    depth = runs.by_depth()
+    assert "section_low" not in depth
+    assert depth[["section", "x_lo_m", "x_hi_m"]].to_numpy().tolist() == [
+        [1, 0, 1e-3],
+        [2, 1e-3, 2e-3],
+    ]
+    assert depth["k_damaged_m2"].tolist() == pytest.approx([2e-11] * 2, rel=1e-12)
+    high = depth["k_damaged_m2_high"].tolist()
+    assert high == pytest.approx([(2 + half) * 1e-11] * 2, rel=1e-6)
+    assert depth["k_damaged_m2_low"].tolist() == [0, 0]  # cut: no permeability is negative
+    axes = runs.plot()
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("depth (mm)", "permeability in place (mD)")
+    assert not (tmp_path / "table.csv").exists()
+    assert runs.table["skin"].tolist() == [1, 2, 3]
+    written = fdnet.compare_runs(sorted(tmp_path.iterdir()), out=tmp_path / "compared")
+    assert (written.summary["skin"], str(written)) == (runs.summary["skin"], str(runs))
+
+
+def test_runs_of_several_variants_open_by_variant(tmp_path):
+    compared(tmp_path, {"a": [0.1, 0.3], "b": [0.6, 0.8]})
+    runs = fdnet.open_runs(tmp_path / "made")
+    assert runs.mean["a", "k_reduction"] == pytest.approx(0.2)
+    assert runs.band.loc[("b", "k_reduction"), "seeds"] == 2
+    with pytest.raises(fdnet.CaseError, match="does not exist"):
+        fdnet.open_runs(tmp_path / "no")
 
 
 def test_the_tables_are_read_with_their_types(tmp_path):

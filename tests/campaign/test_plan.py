@@ -139,7 +139,7 @@ def test_a_folder_keeps_its_plan(tmp_path, capsys):
 
 
 def designed(write, losses: dict[str, list[float]], targets: str, capsys, **more) -> dict:
-    """summary.json of `fdnet design` over made-up muds, with the printed lines as `lines`."""
+    """summary.json of `fdnet sweep` over made-up muds, with the printed lines as `lines`."""
     muds = "".join(
         f'[[variants]]\nname = "{name}"\nfines.count = {50 + number}\n'
         for number, name in enumerate(losses)
@@ -147,7 +147,7 @@ def designed(write, losses: dict[str, list[float]], targets: str, capsys, **more
     seeds = len(next(iter(losses.values())))
     path = write(f'case = "tiny.toml"\nseeds = {seeds}\n{muds}[targets]\n{targets}\n')
     out = path.parent / "out"
-    arguments = ["design", str(path), "--gather", "--quiet", "--out", str(out)]
+    arguments = ["sweep", str(path), "--gather", "--quiet", "--out", str(out)]
     assert main(arguments) == 5
     for row in json.loads((out / "plan.json").read_text())["runs"]:
         case = read_case(out / f"cases/{row['name']}.toml")
@@ -190,12 +190,11 @@ def test_bridging_is_the_share_that_passes(write, capsys):
 
 def test_bad_targets_are_refused(write, capsys):
     for targets, message in (
-        ("", "targets: missing"),
         ("cost = 3", "targets.cost: unknown"),
         ("depth = '5 kg'", "targets.depth"),
     ):
         path = write(f'case = "tiny.toml"\n[targets]\n{targets}')
-        assert main(["design", str(path), "--out", str(path.parent / "out")]) == 2
+        assert main(["sweep", str(path), "--out", str(path.parent / "out")]) == 2
         assert message in capsys.readouterr().err
 
 

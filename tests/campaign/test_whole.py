@@ -9,6 +9,7 @@ import pytest
 import tomli_w
 from builders import TINY
 
+import fdnet
 from fdnet.cli import main
 
 pytestmark = pytest.mark.liggghts
@@ -61,6 +62,19 @@ def test_the_table_has_every_run_and_number(swept):
     assert float(row["k_damaged_m2"]) == summary["k_damaged_m2"]
     assert float(row["sections.2.k_reduction"]) == summary["sections"][1]["k_reduction"]
     assert int(row["warnings"]) == len(summary["warnings"])
+
+
+def test_python_opens_it_as_one_object(swept):
+    """The numbers of its summary.json; runs that failed are in the table."""
+    runs, written = fdnet.open_runs(swept[0]), json.loads((swept[0] / "summary.json").read_text())
+    few = next(row for row in written["variants"] if row["name"] == "few")
+    row = runs.band.loc[("few", "k_reduction")]
+    assert {name: row[name] for name in row.index} == {n: few["k_reduction"][n] for n in row.index}
+    assert runs.summary == written
+    assert runs.table["status"].tolist().count("failed") == 2
+    depth = runs.by_depth()
+    assert set(depth["variant"]) == {"few", "many"}
+    assert depth["x_hi_m"].max() == pytest.approx(1e-3 * TINY["box"]["size_mm"][0])
 
 
 def test_the_difference_is_taken_seed_by_seed(swept):

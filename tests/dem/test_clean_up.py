@@ -22,7 +22,7 @@ from fdnet.dem.clean_up import (
 )
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
-from fdnet.run.dem_stages import invaded, packed_grains
+from fdnet.run.dem_stages import invaded, invasion_record, packed_grains
 from fdnet.run.folder import open_folder
 from fdnet.run.pipeline import RunOptions, run_stages
 from fdnet.run.records import Session
@@ -64,7 +64,7 @@ def start(run):
         case=case, scales=scales_of(case), folder=held, options=RunOptions(out=folder)
     )
     grains = packed_grains(session)
-    damaged = invaded(session, case, grains).damaged
+    damaged = invaded(session, case, grains, invasion_record(session, case)).damaged
     held.close()
     return Start(grains=grains, invaded=damaged, invasion=folder / "invade", digest="test")
 

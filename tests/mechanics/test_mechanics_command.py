@@ -81,13 +81,13 @@ def test_hertz_contacts_stiffen_with_the_third_root_of_pressure(packed):
     pair = resting([[1e-3, 1e-3, 1e-3], [1.5e-3, 1e-3, 1e-3]], 2.5e-4, [[0, 2.4e-3]] * 3)
     soft, stiff = (pack_material(case, pair, pressure) for pressure in (1e6, 8e6))
     assert stiff.normal / soft.normal == pytest.approx(2.0, rel=1e-9)
-    with pytest.raises(CaseError, match="--confining_MPa"):
+    with pytest.raises(CaseError, match="--confining-MPa"):
         pack_material(case, pair)
 
 
 @pytest.mark.liggghts
 def test_a_triaxial_test_leaves_its_curve(packed, capsys):
-    asked = ("--confining_MPa", 5, "--strain", 2e-4, "--steps", 2)
+    asked = ("--confining-MPa", 5, "--strain", 2e-4, "--steps", 2)
     numbers = printed(capsys, packed, "--triaxial", *asked)
     lines = (packed / "mechanics" / "stress_strain.csv").read_text().splitlines()
     assert len(lines) == 5
@@ -105,10 +105,10 @@ def test_bad_keys_and_tests_are_refused(packed, capsys, tmp_path):
         (with_keys("bonds.tensile_strength_MPa=5"), "bonds.radius_ratio: missing"),
         (with_keys("bonds.radius_ratio=1.5"), "less than or equal to 1"),
         (with_keys("grains.radius_mm=0.2"), "belongs to another case"),
-        *((["--confining_MPa", value], stress) for value in ("-1", "0", "nan")),
-        (["--triaxial"], "give --confining_MPa"),
-        (["--triaxial", "--confining_MPa", "1", "--strain", "0.9"], "--strain: 0.9"),
-        (["--triaxial", "--confining_MPa", "1e6"], "expected at most 5 %"),
+        *((["--confining-MPa", value], stress) for value in ("-1", "0", "nan")),
+        (["--triaxial"], "give --confining-MPa"),
+        (["--triaxial", "--confining-MPa", "1", "--strain", "0.9"], "--strain: 0.9"),
+        (["--triaxial", "--confining-MPa", "1e6"], "expected at most 5 %"),
     ]:
         assert main(["mechanics", str(packed), *arguments]) == 2, arguments
         assert words in capsys.readouterr().err

@@ -142,9 +142,11 @@ def test_direct_takes_over_where_multigrid_fails_and_what_neither_can_solve_is_r
 ):
     chain = np.array([[0, 1], [1, 2]])
     for pair, most in ((chain[:0], 3), (chain[:0], 0), (chain, 0)):
-        closed = Balances(pair, np.ones(len(pair)), np.zeros(3), direct_up_to=most)
+        monkeypatch.setattr(solver, "DIRECT_UP_TO", most)
+        closed = Balances(pair, np.ones(len(pair)), np.zeros(3))
         with pytest.raises(FlowError, match=r"3 pores failed: .*no way out"):
             closed.solve(np.ones(3))
+    monkeypatch.setattr(solver, "DIRECT_UP_TO", 10_000)
     pair, g, tied, source = links()
     expected = Balances(pair, g, tied).solve(source)
     monkeypatch.setattr(solver, "DIRECT_UP_TO", 0)

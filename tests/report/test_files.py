@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,6 +14,7 @@ import pyvista as pv
 from builders import naming
 
 import fdnet
+from fdnet.cli import main
 from fdnet.errors import CaseError
 from fdnet.files import replacing, write_text
 from fdnet.report import picture, vtk
@@ -185,6 +187,32 @@ def test_a_dead_or_hanging_child_gives_a_reason_and_touches_nothing(tmp_path, mo
         assert list(tmp_path.iterdir()) == [path]
     monkeypatch.setattr(picture, "drawing_command", lambda *_: [str(tmp_path / "no-python")])
     assert "no 3-D picture" in picture.render_spheres_png(tmp_path / "v.png", "s.vtp", BOX)
+
+
+def test_without_vtk_a_run_lacks_those_files_alone_and_says_so(
+    finished, tmp_path, monkeypatch, capsys
+):
+    folder, mesh = tmp_path / "run", finished.path / "spheres_damaged.vtp"
+    shutil.copytree(finished.path, folder)
+    for name in ("pyvista", "vtkmodules"):
+        monkeypatch.setitem(sys.modules, name, None)
+    command = ["run", str(folder / "case.toml"), "--out", str(folder), "--stages", "report"]
+    assert main([*command, "--force"]) == 0
+    answer, said = capsys.readouterr()
+    assert "permeability" in answer
+    assert said.count("warning: no 3-D picture and no ParaView files") == 1
+    lost = {"spheres.pvd", "invasion.pvd", "frames", "figures/spheres_3d.png"}
+    gone = {str(path.relative_to(finished.path)) for path in finished.path.rglob("*")}
+    gone -= {str(path.relative_to(folder)) for path in folder.rglob("*")}
+    assert lost <= gone <= lost | {name for name in gone if name.endswith(".vtp")}
+    run = fdnet.open_run(folder)
+    assert run.summary["k_damaged_m2"] == finished.summary["k_damaged_m2"]
+    assert sum("pip install 'fdnet[view]'" in text for text in run.summary["warnings"]) == 1
+    assert main(["movie", str(folder)]) == 2
+    assert "pip install 'fdnet[view]'" in capsys.readouterr().err
+    for door in (run.network_mesh, run.sphere_mesh, lambda: read_spheres(mesh)):
+        with pytest.raises(CaseError, match=r"needs VTK, .*pip install 'fdnet\[view\]'"):
+            door()
 
 
 def test_the_paraview_script_names_arrays_that_the_files_have(finished, tmp_path):

@@ -1,6 +1,8 @@
 """A finished run: its tables as objects, and files that were changed are refused by name."""
 
+import copy
 import json
+import pickle
 import shutil
 import subprocess
 import sys
@@ -10,12 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import TINY, naming, tiny
+from matplotlib.figure import Figure
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 import fdnet
 from fdnet.case.file import case_from
 from fdnet.errors import CaseError, FdnetError
+from fdnet.report.figures import fill_depth
 from fdnet.report.tables import openpnm_arrays
 from fdnet.run.finished import FinishedRun
 from fdnet.run.folder import TABLES
@@ -71,6 +75,39 @@ def test_tables_agree_with_the_summary(run):
     assert last["physical_time_s"] == pytest.approx(summary["physical_time_s"], rel=1e-8)
     for name in ("invaded", "passed", "upstream", "supplied"):
         assert last[f"{name}_count"] == summary[f"{name}_count"], name
+
+
+def test_what_a_user_types_first_is_there(run):
+    summary = run.summary
+    assert run.k_damaged_m2 == summary["k_damaged_m2"]
+    assert run.k_damaged_mD == pytest.approx(summary["k_damaged_m2"] / 9.869233e-16, rel=1e-12)
+    assert (run.lost, run.k_reduction) == (summary["k_reduction"],) * 2
+    assert (run.stop_reason, run.porosity_initial) == (
+        summary["stop_reason"],
+        summary["porosity_initial"],
+    )
+    assert {"k_initial_mD", "k_initial_m2", "warnings", "plot", "sections"} <= set(dir(run))
+    assert len(run.sections) == 3  # the table, and not the list of the summary
+    with pytest.raises(AttributeError, match="no 'k_damage_mD'; did you mean k_damaged_mD"):
+        _ = run.k_damage_mD
+    assert copy.copy(run).k_initial_m2 == run.k_initial_m2
+    assert pickle.loads(pickle.dumps(run)).k_initial_m2 == run.k_initial_m2
+
+
+def test_its_plot_is_that_of_its_analysis(run, analysed):
+    """The same lines as the figure of the report, drawn from the tables (nine digits)."""
+    figure = Figure()
+    fill_depth(figure, analysis=analysed)
+    own = run.plot()
+    assert [one.get_ylabel() for one in own] == ["permeability in place (mD)", "porosity (–)"]
+    assert own[1].get_xlabel() == "depth from the formation face (mm)"
+    for drawn, expected in zip(own, figure.axes, strict=True):
+        assert drawn.get_yscale() == expected.get_yscale()
+        assert len(drawn.patches) == len(expected.patches) > 1
+        for one, other in zip(drawn.patches, expected.patches, strict=True):
+            assert one.get_label() == other.get_label()
+            assert one.get_data().edges == pytest.approx(other.get_data().edges, rel=1e-8)
+            assert one.get_data().values == pytest.approx(other.get_data().values, rel=1e-8)
 
 
 def test_its_spheres_and_its_last_dump_give_its_permeability_again(either):

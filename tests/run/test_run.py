@@ -1,6 +1,7 @@
 """Whole runs by command line and real binary: output contract, killing, resuming, refusals."""
 
 import contextlib
+import csv
 import fcntl
 import hashlib
 import io
@@ -286,6 +287,50 @@ def test_a_run_killed_at_any_moment_is_completed_by_resume(whole, tmp_path, mome
     assert result["k_damaged_m2"] == summary["k_damaged_m2"]
     assert (out / "spheres_damaged.csv").read_text() == (run / "spheres_damaged.csv").read_text()
     assert (out / "report.html").exists() == (moment == "figures")
+
+
+def test_a_cut_run_has_a_provisional_answer_until_it_goes_on(whole, tmp_path):
+    """It says how far the invasion is and changes nothing of it; --resume ends as an uncut run."""
+    run, case, summary = whole
+    out, words = tmp_path / "run", ["--stages", "pack,invade,analyse"]
+    rows = out / "invade/history.csv"
+    early = ["run", case, "--out", out, "--resume", "--json", "--stages", "analyse,report"]
+    assert fdnet(*early[:4], "--stages", "pack").returncode == 0
+    assert "no finished invasion here" in fdnet(*early).stderr
+
+    def ready() -> bool:
+        return rows.exists() and rows.read_text().count("\n") > 4
+
+    kill_when([*map(str, early[:5]), *words], ready, signal.SIGINT)
+
+    def left() -> dict[Path, bytes]:
+        return {path: path.read_bytes() for path in (out / "invade").rglob("*") if path.is_file()}
+
+    before = left()
+    made = fdnet(*early)
+    assert made.returncode == 0, made.stderr
+    said = json.loads(made.stdout)
+    assert (said["stop_reason"], said["final"]) == ("unfinished", False)
+    assert 0 < said["share_done"] < 1
+    assert said["invaded_count"] < summary["supplied_count"]
+    whole_ones = [int(path.stem.split("_")[1]) for path in out.glob("invade/post/*.record")]
+    read = list(csv.DictReader((out / "history.csv").open()))
+    assert int(read[-1]["step"]) == max(whole_ones)
+    start = f"Provisional, at {100 * said['share_done']:.1f} % of the invasion: so far"
+    assert said["answer"].startswith(start)
+    assert start in (out / "report.html").read_text()
+    assert left() == before
+    assert not (out / "manifest.json").exists()
+    assert fdnet("run", case, "--out", out, *words).returncode == 2
+    resumed = fdnet("run", case, "--out", out, "--resume", "--json", *words)
+    assert resumed.returncode == 0, resumed.stderr
+    result = json.loads(resumed.stdout)
+    assert result["stop_reason"] == summary["stop_reason"]
+    assert "share_done" not in result
+    assert result["k_damaged_m2"] == summary["k_damaged_m2"]
+    assert not (out / "report.html").exists()
+    for name in ("spheres_damaged.csv", "history.csv", "invade/history.csv"):
+        assert (out / name).read_bytes() == (run / name).read_bytes(), name
 
 
 def test_two_runs_cannot_write_the_same_folder(tmp_path):

@@ -1,7 +1,8 @@
 """Permeability by depth: slabs cut out and in place, thin layers, sections and profile."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -212,6 +213,17 @@ class Section:
     k_damaged_inplace: float
     fines_count: int
     fines_fraction: float
+
+    def row(self) -> dict[str, Any]:
+        """The values by the names of sections.csv, which end in their unit (m, m2)."""
+        values = {one.name: getattr(self, one.name) for one in fields(self)}
+        return {f"{name}{SECTION_UNITS.get(name, '')}": value for name, value in values.items()}
+
+
+SECTION_UNITS = dict.fromkeys(("x_lo", "x_hi"), "_m") | dict.fromkeys(
+    ("k_initial", "k_damaged", "k_initial_inplace", "k_damaged_inplace"), "_m2"
+)
+"""How the names of a section's values end in tables."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -1,0 +1,5 @@
+"""`python -m fdnet` is `fdnet`."""
+
+from fdnet.cli import main
+
+raise SystemExit(main())
