@@ -438,11 +438,7 @@ CAPTIONS = {
     "side_view": "Section x-z through the middle of the specimen. Grains are drawn where the "
     "plane cuts them, so that a grain cut off its middle looks small; fines that the plane meets "
     "are drawn whole.",
-    "porosity_reduction": "Porosity lost to the fines against depth: difference of the intact and "
-    "the damaged porosity, in fine bins and per section.",
     "invaded_fraction": "Share of the invaded fines, by number, against depth.",
-    "permeability_ratio": "Damaged over intact permeability of each section, cut out with its own "
-    "network and in place from the pressures of the whole specimen.",
     "depth": "Permeability in place (sections, and thin layers of the first millimetre) and "
     "porosity against depth, intact and damaged. In place is under the pressures of the whole "
     "specimen; where the fines turn the flow aside, a layer can take less of the pressure than "
@@ -488,9 +484,7 @@ def draw_all(
         if has_sizes(snapshot):
             draws["deposit_by_size"] = partial(fill_deposit, spheres=snapshot)
     if analysis.occupancy is not None:
-        draws["porosity_reduction"] = partial(_porosity_reduction, analysis=analysis)
         draws["invaded_fraction"] = partial(_invaded_fraction, analysis=analysis)
-        draws["permeability_ratio"] = partial(_permeability_ratio, analysis=analysis)
     if analysis.layers is not None:
         draws["layers"] = partial(_layers, layers=analysis.layers)
     draws["network"] = partial(fill_network, analysis=analysis)
@@ -506,26 +500,8 @@ def _section_edges(analysis: "Analysis") -> Array:
     return np.array([s.x_lo for s in analysis.sections] + [analysis.sections[-1].x_hi])
 
 
-def _depth_axes(figure: Any, analysis: "Analysis") -> Any:
-    axes = figure.add_subplot()
-    axes.set(xlabel=DEPTH_LABEL, xlim=np.asarray(analysis.network.box[0]) * MM)
-    return axes
-
-
-def _porosity_reduction(figure: Any, *, analysis: "Analysis") -> None:
-    axes, profile = _depth_axes(figure, analysis), analysis.profile
-    lost = np.subtract(profile.porosity_initial, profile.porosity_damaged)
-    bins = {"fill": True, "alpha": 0.3, "label": "bins", "linewidth": None, "baseline": 0}
-    stairs(axes, profile.edges, lost, color=BLUE, **bins)
-    by_section = [s.porosity_initial - s.porosity_damaged for s in analysis.sections]
-    stairs(axes, _section_edges(analysis), by_section, color=BLUE, label="sections")
-    axes.axhline(0, color=GREY, linewidth=0.8)
-    axes.set_ylabel("porosity reduction, intact − damaged (–)")
-    legend_above(axes)
-
-
 def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
-    axes, edges = _depth_axes(figure, analysis), np.asarray(analysis.profile.edges)
+    axes, edges = figure.add_subplot(), np.asarray(analysis.profile.edges)
     label = f"{analysis.invaded_count} invaded fines"
     filled = {"fill": True, "alpha": 0.6, "linewidth": None, "baseline": 0}
     stairs(axes, edges, analysis.profile.fines_fraction, color=ORANGE, label=label, **filled)
@@ -538,35 +514,7 @@ def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
             axes.axvline(depth, color="black", linestyle=line, linewidth=1.3, label=said)
     width = np.diff(edges).mean() * MM
     axes.set(ylabel=f"share of invaded fines per {width:.3g} mm (–)", ylim=(0, None))
-    legend_above(axes)
-
-
-def _ratios(damaged: Sequence[float], initial: Sequence[float]) -> Array:
-    """Damaged over initial, NaN where there is no intact permeability to compare with."""
-    below = np.asarray(initial, float)
-    return np.divide(
-        np.asarray(damaged, float), below, out=np.full(len(below), np.nan), where=below > 0
-    )
-
-
-def _permeability_ratio(figure: Any, *, analysis: "Analysis") -> None:
-    axes, edges, sections = (
-        _depth_axes(figure, analysis),
-        _section_edges(analysis),
-        analysis.sections,
-    )
-    cut_out = _ratios([s.k_damaged for s in sections], [s.k_initial for s in sections])
-    in_place = _ratios(
-        [s.k_damaged_inplace for s in sections], [s.k_initial_inplace for s in sections]
-    )
-    stairs(axes, edges, cut_out, color=BLUE, label="section cut out")
-    stairs(axes, edges, in_place, color=ORANGE, linestyle="--", label="section in place")
-    if analysis.k_initial > 0:
-        whole = analysis.k_damaged / analysis.k_initial
-        line = {"color": GREY, "linewidth": 1.2, "linestyle": ":"}
-        axes.axhline(whole, label=f"whole specimen {whole:.3f}", **line)
-    highest = np.nanmax([1.0, *cut_out, *in_place])
-    axes.set(ylabel="permeability damaged / intact, k/k₀ (–)", ylim=(0, 1.05 * highest))
+    axes.set(xlabel=DEPTH_LABEL, xlim=np.asarray(analysis.network.box[0]) * MM)
     legend_above(axes)
 
 

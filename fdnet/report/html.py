@@ -252,20 +252,16 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
     page = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    page.filters.update(
-        quantity=quantity,
-        millidarcy=in_millidarcy,
-        percent=percent,
-        multiplied=multiplied,
-        words=words,
-    )
+    for one in (quantity, in_millidarcy, percent, multiplied, words):
+        page.filters[one.__name__] = one
     page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
     page.globals.update(shows=SHOWS, agrees=AGREES, columns=SECTION_COLUMNS)
     figures = [
         {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
         for file, caption in parts.figures
     ]
-    text = page.from_string(_own("report.html.j2")).render(
+    template = resources.files("fdnet.report").joinpath("report.html.j2").read_text("utf-8")
+    text = page.from_string(template).render(
         summary=summary,
         parts=parts,
         figures=[one for one in figures if one["name"] not in (STILL, LEADING)],
@@ -325,10 +321,6 @@ def words(text: str) -> str:
 def multiplied(value: Any, factor: float | None) -> Any:
     """`value` times `factor`; None stays None."""
     return value if value is None or factor is None else value * factor
-
-
-def _own(name: str) -> str:
-    return resources.files("fdnet.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def _data_uri(path: Path) -> str:
