@@ -146,7 +146,7 @@ def test_cohesion_that_draws_fines_into_grains_warns_and_is_refused():
     modulus = scales_of(case).contacts["grain-fine"].elastic.modulus
     joint = 1 / (1 / 5e-5 + 1 / 2.5e-4)
     at_limit = 1e-4 / joint * (modulus / math.pi) ** 2 / 2.25
-    for share, warned in ((0.029, False), (0.031, True)):
+    for share, warned in ((0.049, False), (0.051, True)):
         cohesion = math.sqrt(share * at_limit)
         text = " ".join(
             scales_of(
