@@ -395,7 +395,8 @@ class Run(Part):
     checkpoint_ms: Positive | None = None
     """Time between checkpoints. When absent: the fluid passes about one grain diameter."""
     skin_mm: Positive | None = None
-    """Skin of LIGGGHTS's neighbour search. When absent: the radius of the smallest fine."""
+    """Skin of LIGGGHTS's neighbour search. When absent: 0.3 of the radius of the smallest fine;
+    with the field "uniform" the radius."""
     neighbour_bin_mm: Positive | None = None
     """Bin width of LIGGGHTS's neighbour search. When absent LIGGGHTS chooses it."""
 

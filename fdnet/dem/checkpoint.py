@@ -205,6 +205,14 @@ class Checkpoints:
             usable.append((row, record))
         return next((row for row, record in reversed(usable) if self._is_whole(row, record)), None)
 
+    def has_its_dump(self, step: int) -> bool:
+        """Whether the dump of a checkpoint is as it was recorded."""
+        record = self.record(step)
+        try:
+            return record is not None and file_digest(self.path(step, "dump")) == record.dump
+        except OSError:
+            return False
+
     def _is_whole(self, row: Any, record: Record) -> bool:
         try:
             return self._digests(row.step).items() <= record._asdict().items()

@@ -383,6 +383,12 @@ class InvadeStage(ChunkedStage):
         def lasting(first: int, row: Checkpoint) -> float:
             seen = [one.fraction for one in watched if first < one.step <= row.step]
             if not seen:
+                if row is not last and not self.points.has_its_dump(row.step):
+                    raise LiggghtsError(
+                        f"{self.points.path(row.step, 'dump')}: is missing, or not as it was "
+                        "recorded, and the springs of the next chunk follow from it; put it back, "
+                        "or start over with --force"
+                    )
                 state = state_at(self.folder, row, case, scales, self.grains)
                 seen.append(overlap_in(case, state).fraction)
             return lasting_overlap(seen)
@@ -437,18 +443,20 @@ class InvadeStage(ChunkedStage):
     def ending(self, history: Sequence[Checkpoint]) -> tuple[str, list[str]]:
         """The stop reason, and warnings.
 
-        An empty slab decides nothing about plugging, so it is a reason of its own: fewer than
-        `ARRIVALS` fines wait upstream. Mud without an end was cut off then.
+        An empty slab decides nothing about plugging, so it is a reason of its own: no fine waits
+        upstream, or fewer than `ARRIVALS` where the flow follows the deposit. Mud without an end
+        was cut off then.
         """
         case, scales, last = self.case, self.scales, history[-1]
         waiting = last.upstream - last.removed_upstream
+        enough = ARRIVALS if case.drag.coupled else 1
         warnings: list[str] = []
         reason = flow_says(self.folder, case, scales, last.step)
         if reason is None and case.run.duration_s is not None:
             reason = "duration"
         elif reason is None and quiet_enough(self.folder, case, scales, last):
             reason = "mud_cut_off" if case.fines.endless else "supply_exhausted"
-            reason = "plugged" if waiting >= ARRIVALS else reason
+            reason = "plugged" if waiting >= enough else reason
         elif reason is None:
             reason, cap = "cap", scales.cap_time * scales.force_factor
             warnings.append(

@@ -347,17 +347,14 @@ def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
     What its table [run] says of the length of the invasion is that of the clean-up.
     """
     fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
-    undriven = case.drag.model_copy(update={"drive_velocity_m_s": "fluid"})
-    turned = case.model_copy(update={"fluid": fluid, "run": run, "drag": undriven})
-    turned = stiff_enough(turned, start=False)
-    asked = case.drag.drive_velocity_m_s
-    if asked == "fluid":
-        return turned
-    own = scales_of(turned).interstitial_velocity
-    driven = own * invasion_scales(case).force_factor
-    if asked == "auto":
-        driven = min(
-            driven, invasion_scales(turned.model_copy(update={"drag": case.drag})).drive_velocity
-        )
-    drag = case.drag.model_copy(update={"drive_velocity_m_s": driven if driven > own else "fluid"})
-    return turned.model_copy(update={"drag": drag})
+    turned, asked = case.model_copy(update={"fluid": fluid, "run": run}), case.drag
+    if asked.drive_velocity_m_s != "fluid":
+        porosity = target_porosity(case)
+        before, flow = velocity_of(case, porosity), velocity_of(turned, porosity)
+        driven = flow.interstitial * drive_in(case, before).factor
+        if asked.drive_velocity_m_s == "auto":
+            driven = min(driven, drive_in(turned, flow).velocity)
+        drive = driven if driven > flow.interstitial else "fluid"
+        drag = asked.model_copy(update={"drive_velocity_m_s": drive})
+        turned = turned.model_copy(update={"drag": drag})
+    return stiff_enough(turned, start=False)
