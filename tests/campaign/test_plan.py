@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import tomli_w
-from builders import TINY, tiny
+from builders import TINY, naming, tiny
 from campaign.samples import finished_run
 
 import fdnet
@@ -13,6 +13,8 @@ from fdnet import read_case
 from fdnet.campaign.plan import sweep_plan
 from fdnet.cli import main
 from fdnet.errors import CaseError
+from fdnet.run.pipeline import refusals
+from fdnet.scales.scales import scales_of
 
 GRID = """
 case = "tiny.toml"
@@ -203,3 +205,13 @@ def test_the_shipped_design_plans_three_muds_in_eight_packs(root):
     diameters = [round(2e6 * v.case.fines.mean_radius_m) for v in plan.variants]
     assert diameters == [30, 60, 100]
     assert (len(plan.jobs), len(set(plan.packs.values()))) == (24, 8)
+
+
+def test_every_variant_of_the_shipped_sweeps_runs(root):
+    """None is refused, and none has springs that its deposit would press flat."""
+    for name in ("bridging", "clogging", "coupling", "drag-and-overbalance"):
+        for variant in sweep_plan(root / f"cases/sweeps/{name}.toml").variants:
+            scales = scales_of(variant.case)
+            with naming(name, variant.name):
+                assert not list(refusals(variant.case, scales))
+                assert scales.deposit_overlap < 0.1

@@ -18,7 +18,13 @@ from fdnet.errors import CaseError
 from fdnet.scales.clock import STARTING, deposit_pressure, slab_of
 from fdnet.scales.contacts import series
 from fdnet.scales.flow import Losses, carman_kozeny, radial, straight, velocity_of
-from fdnet.scales.scales import InvasionScales, invasion_scales, scales_of, stiffened
+from fdnet.scales.scales import (
+    InvasionScales,
+    back_flow,
+    invasion_scales,
+    scales_of,
+    stiffened,
+)
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Array, Kind
 
@@ -470,3 +476,15 @@ def test_driven_fines_go_the_same_way_in_a_part_of_the_time(binary, tmp_path):
     in_radii = np.linalg.norm(away, axis=1) / 5e-5
     assert np.median(in_radii) < 0.1
     assert in_radii.max() < 0.3
+
+
+def test_the_springs_of_a_clean_up_bear_its_load_where_the_fines_are_driven(root):
+    """Drives of 5.2 and 34 times the fluid, at weak and strong drawdowns."""
+    for name in ("well", "reservoir-sand"):
+        for drawdown in (0.1, 0.7, 3.5):
+            with naming(name, drawdown):
+                keys = [f"clean_up.drawdown_MPa={drawdown}"]
+                case = read_case(root / f"cases/{name}.toml", assignments=keys)
+                flow = back_flow(case).scales
+                assert max(flow.deposit_overlap, flow.drag_overlap, flow.impact_overlap) <= 0.03
+                assert 1.0 < flow.force_factor <= invasion_scales(case).force_factor * (1 + 1e-9)
