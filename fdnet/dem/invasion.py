@@ -443,20 +443,18 @@ class InvadeStage(ChunkedStage):
     def ending(self, history: Sequence[Checkpoint]) -> tuple[str, list[str]]:
         """The stop reason, and warnings.
 
-        An empty slab decides nothing about plugging, so it is a reason of its own: no fine waits
-        upstream, or fewer than `ARRIVALS` where the flow follows the deposit. Mud without an end
-        was cut off then.
+        An empty slab decides nothing about plugging, so it is a reason of its own: fewer than
+        `ARRIVALS` fines wait upstream. Mud without an end was cut off then.
         """
         case, scales, last = self.case, self.scales, history[-1]
         waiting = last.upstream - last.removed_upstream
-        enough = ARRIVALS if case.drag.coupled else 1
         warnings: list[str] = []
         reason = flow_says(self.folder, case, scales, last.step)
         if reason is None and case.run.duration_s is not None:
             reason = "duration"
         elif reason is None and quiet_enough(self.folder, case, scales, last):
             reason = "mud_cut_off" if case.fines.endless else "supply_exhausted"
-            reason = "plugged" if waiting >= enough else reason
+            reason = "plugged" if waiting >= ARRIVALS else reason
         elif reason is None:
             reason, cap = "cap", scales.cap_time * scales.force_factor
             warnings.append(
@@ -475,14 +473,10 @@ class InvadeStage(ChunkedStage):
                 )
             )
         elif waiting == 0 or reason == "supply_exhausted":
-            left = f"only {waiting} fines are" if waiting else "no fine is"
-            warnings.append(
-                Doubt(
-                    "empty-slab",
-                    f"{left} left upstream: the end was decided by an empty slab, raise "
-                    "fines.count or fines.slab_mm",
-                )
-            )
+            left = "no fine is left upstream: the end was decided by an empty slab"
+            if waiting:
+                left = f"only {waiting} fines are left upstream, too few to call the face plugged"
+            warnings.append(Doubt("empty-slab", f"{left}: raise fines.count or fines.slab_mm"))
         before = history[-min(len(history), quiet_chunks(scales) + 1)]
         if reason == "plugged" and last.passed - before.passed > plug_allowance(case, scales):
             warnings.append(

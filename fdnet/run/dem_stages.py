@@ -73,7 +73,7 @@ def _forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
 def invasion_record(session: Session, case: InvasionCase) -> dict[str, Any]:
     """The record of the invasion; of one that was cut, what it is at its last whole checkpoint.
 
-    That one has the key `share_done`: steps done over those that it is expected to take. Raises
+    That one has the key `share_done`: time done over that which it is expected to take. Raises
     CaseError where there is no whole checkpoint yet.
     """
     record = session.folder.record("invade")
@@ -83,7 +83,10 @@ def invasion_record(session: Session, case: InvasionCase) -> dict[str, Any]:
     result = invasion_so_far(case, scales, packed_grains(session), folder)
     if result is None:
         raise CaseError(f"{folder}: has no whole checkpoint yet; go on with --resume")
-    seen = [(row.step, row.invaded + row.passed) for row in result.history]
+    # chunks take one time; where springs grow, in more steps
+    seen = [
+        (row.chunk * scales.checkpoint_steps, row.invaded + row.passed) for row in result.history
+    ]
     share = seen[-1][0] / _forecast(case, scales).end(seen)
     return invade_record(case, result, folder, seconds=0.0) | {"share_done": share}
 
