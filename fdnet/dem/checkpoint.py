@@ -694,7 +694,6 @@ class Updates:
         """Keep the rows before step `upto` of an earlier session, or begin a file of `names`."""
         self.path, self.names = folder / UPDATES, ("step", "time_s", *names)
         rows = [row for row in read_updates(folder) if row["step"] < upto] if upto > 0 else []
-        self.first: Mapping[str, float] | None = rows[0] if rows else None
         self.last: Mapping[str, float] | None = rows[-1] if rows else None
         lines = [",".join(self.names), *(self._line(row) for row in rows)]
         write_text(self.path, "\n".join(lines) + "\n")
@@ -704,7 +703,7 @@ class Updates:
         row = {"step": float(step), "time_s": time, **measures}
         with self.path.open("a", encoding="utf-8") as file:
             file.write(self._line(row) + "\n")
-        self.first, self.last = self.first or row, row
+        self.last = row
 
     def _line(self, row: Mapping[str, float]) -> str:
         return ",".join(repr(float(row[name])) for name in self.names)

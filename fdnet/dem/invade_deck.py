@@ -90,9 +90,8 @@ class Moment:
         step: of the simulation.
         time: s, since the start.
         before: the row of the update before this one; None for the first.
-        first: the row of the first update; None for the first.
         fresh: whether a chunk begins. What is answered then must follow from the spheres and the
-            two rows alone, so that a run that was cut gives the same.
+            row before alone, so that a run that was cut gives the same.
         left: s, until the chunk ends, when they are looked at again in any case.
         given: (N,) m/s, speed w at which each of the N fines would go by the forces that it has
             now, in their order; 0 where it has none yet. None where it is not known.
@@ -103,7 +102,6 @@ class Moment:
     step: int
     time: float
     before: Mapping[str, float] | None
-    first: Mapping[str, float] | None
     fresh: bool
     left: float = math.inf
     given: Array | None = None
@@ -121,13 +119,13 @@ class DrivingFluid(Protocol):
         """What acts on the fines of `spheres`, in their order."""
 
 
-def _shown_columns(case: InvasionCase) -> str:
-    return " ".join((COLUMNS, "density", *(GIVEN if case.drag.field == "network" else ())))
+SHOWN_COLUMNS = " ".join((COLUMNS, "density", *GIVEN))
+"""Columns of the state that LIGGGHTS shows."""
 
 
-def read_state(folder: Path, case: InvasionCase) -> Frame:
+def read_state(folder: Path) -> Frame:
     """The spheres that LIGGGHTS shows. Raises DumpError when it did not write all of them."""
-    return read_binary_frame(folder / STATE, tuple(_shown_columns(case).split()))
+    return read_binary_frame(folder / STATE, tuple(SHOWN_COLUMNS.split()))
 
 
 def fine_density(frame: Frame) -> Array:
@@ -162,9 +160,8 @@ def coupled_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
     if not case.drag.coupled:
         return {}
     shown = dump_variables(case)
-    asked = {"dump_columns": _shown_columns(case), "dump_group": shown["dump_group"]}
-    follows = case.drag.field == "network"
-    counted = shown | {"allowance": plug_allowance(case, scales), "follows": follows}
+    asked = {"dump_columns": SHOWN_COLUMNS, "dump_group": shown["dump_group"]}
+    counted = shown | {"allowance": plug_allowance(case, scales), "follows": True}
     parts = {
         "ask.in": render_text("ask.in.j2", asked | {"state": STATE}),
         "fluid.in": render_text("fluid.in.j2", {}),

@@ -252,7 +252,6 @@ class ChunkedStage(ABC):
             step=step,
             time=time,
             before=updates.last,
-            first=updates.first,
             fresh=done == 0,
             left=left * dt,
             given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0) if shows else None,
@@ -268,7 +267,7 @@ class ChunkedStage(ABC):
     def shown(self, feed: Feed) -> Frame:
         """The state that LIGGGHTS shows when it is asked."""
         feed("include ask.in")
-        return read_state(self.folder, self.case)
+        return read_state(self.folder)
 
     def spheres(self, frame: Frame, time: float) -> Snapshot:
         """All spheres of a state at a `time` s, fixed grains too."""

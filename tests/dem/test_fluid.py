@@ -38,7 +38,7 @@ from fdnet.spheres.snapshot import Kind, Snapshot
 
 pytestmark = pytest.mark.liggghts
 LAUNCH = Launch(binary=find_binary())
-FIRST = Moment(step=0, time=0.0, before=None, first=None, fresh=True)
+FIRST = Moment(step=0, time=0.0, before=None, fresh=True)
 
 
 @pytest.fixture(scope="module")
@@ -466,7 +466,7 @@ def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(tmp_path
 
     def play(feed):
         feed("include in.invade", "include ask.in")
-        assert np.array_equal(fine_density(read_state(tmp_path, case)), [2650.0, 1100.5])
+        assert np.array_equal(fine_density(read_state(tmp_path)), [2650.0, 1100.5])
         for number, velocity in enumerate(given):
             write_forces(tmp_path, two, given_forces(np.ones(2), velocity))
             show = f"write_dump fines custom post/{number}.dump id f_uf[1] f_uf[2] f_uf[3]"
@@ -509,7 +509,7 @@ def applied_force(case, fines, folder) -> np.ndarray:
         show = 'write_dump fines custom post/{}.dump id fx modify sort id format "%d %.17g"'
         feed("include in.invade", "velocity fines set 0.0 0.0 0.0")
         feed("run 0", show.format("without"), "include ask.in")
-        shown = snapshot_of(read_state(folder, case), case, time_s=0.0)
+        shown = snapshot_of(read_state(folder), case, time_s=0.0)
         assert np.array_equal(shown.id, fines.id)
         write_forces(folder, shown, fluid_of(case, scales, grain).forces(shown, FIRST))
         feed("include fluid.in", "run 0", show.format("with"))
