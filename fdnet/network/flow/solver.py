@@ -8,7 +8,6 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pyamg
@@ -18,7 +17,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from fdnet.errors import FlowError
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled
 from fdnet.spheres.snapshot import Array, one_line
 
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
@@ -182,21 +181,8 @@ def multigrid(matrix: sparse.csr_matrix) -> Solve:
     return solve
 
 
-class Rows(NamedTuple):
-    """Where the rows of a matrix begin, the columns of its entries, and their values."""
-
-    first: Array
-    column: Array
-    value: Array
-
-
 def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
-    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner.
-
-    The levels are pyamg's, and the numbers of a cycle are those of its own to the last digit.
-    Called one by one from Python its operations take several times as long, for the levels of a
-    pack hold a few thousand pores at most; it also computes two norms that are not needed.
-    """
+    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner."""
     hierarchy = pyamg.ruge_stuben_solver(
         matrix,
         strength=("classical", {"theta": STRENGTH}),
@@ -206,68 +192,8 @@ def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
         max_coarse=10,
         coarse_solver="splu",
     )
-    levels = [
-        (
-            *(Rows(one.indptr, one.indices, one.data) for one in (level.A, level.P)),
-            level.P.shape[1],
-        )
-        for level in hierarchy.levels[:-1]
-    ]
-    last = hierarchy.levels[-1].A
-
-    def cycle(source: Array) -> Array:
-        passed = []
-        for own, prolongation, count in levels:
-            solution, coarse = np.zeros(len(source)), np.zeros(count)
-            _down(own, prolongation, solution, source, coarse)
-            passed.append((own, prolongation, solution, source))
-            source = coarse
-        below = np.asarray(hierarchy.coarse_solver(last, source))
-        for own, prolongation, solution, given in reversed(passed):
-            _up(own, prolongation, solution, given, below)
-            below = solution
-        return below
-
+    cycle: Callable[[Array], Array] = hierarchy.aspreconditioner(cycle="V").matvec
     return cycle
-
-
-@compiled_in_place
-def _relax(matrix: Rows, row: int, solution: Array, source: Array) -> None:
-    """Sets the solution of one row to what balances it; a row without a diagonal stays."""
-    total, diagonal = 0.0, 0.0
-    for entry in range(matrix.first[row], matrix.first[row + 1]):
-        if matrix.column[entry] == row:
-            diagonal = matrix.value[entry]
-        else:
-            total += matrix.value[entry] * solution[matrix.column[entry]]
-    if diagonal != 0.0:
-        solution[row] = (source[row] - total) / diagonal
-
-
-@compiled_in_place
-def _down(matrix: Rows, prolongation: Rows, solution: Array, source: Array, coarse: Array) -> None:
-    """A forward sweep from a solution of 0, and what is left added to the next level, `coarse`."""
-    for row in range(len(source)):
-        _relax(matrix, row, solution, source)
-    for row in range(len(source)):
-        total = 0.0
-        for entry in range(matrix.first[row], matrix.first[row + 1]):
-            total += matrix.value[entry] * solution[matrix.column[entry]]
-        missing = source[row] - total
-        for entry in range(prolongation.first[row], prolongation.first[row + 1]):
-            coarse[prolongation.column[entry]] += prolongation.value[entry] * missing
-
-
-@compiled_in_place
-def _up(matrix: Rows, prolongation: Rows, solution: Array, source: Array, coarse: Array) -> None:
-    """Adds what the next level gives, `coarse`, to the solution, and sweeps backward."""
-    for row in range(len(solution)):
-        total = 0.0
-        for entry in range(prolongation.first[row], prolongation.first[row + 1]):
-            total += prolongation.value[entry] * coarse[prolongation.column[entry]]
-        solution[row] += total
-    for row in range(len(solution) - 1, -1, -1):
-        _relax(matrix, row, solution, source)
 
 
 def _total(values: Array) -> float:
