@@ -16,12 +16,12 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from tests.network.packs import random_pack, with_fines
 
 NIGHTLY = pytest.mark.nightly
-ROUNDING = 1e-11
-"""Largest relative difference of two descriptions, without fines and with them."""
+ROUNDING = 1e-4
+"""Largest relative difference of two descriptions: sections are summed over rays, and prisms at a
+face are split either way."""
 
-RAYS = {"xyz": 1e-4, "yz": 1e-4, "": 5e-4}
-"""By the default damage law, which sums sections over rays and splits prisms at a face either way:
-at side walls there are more of these."""
+RAYS = {"xyz": 1e-3, "yz": 1e-3, "": 2e-3}
+"""By the default damage law, whose sections are open: at side walls there are more such prisms."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
