@@ -174,7 +174,7 @@ def test_runs_open_as_one_object_with_bands_by_quantity_and_by_depth(tmp_path):
     assert (written.summary["skin"], str(written)) == (runs.summary["skin"], str(runs))
     page = (written.path / "compare.html").read_text()
     # 2e-11 and 2.484e-11 m2 over 9.86923e-16
-    assert "20,270 mD<br>\n<small>0 to 45,440 mD, cut at 0 mD</small>" in page
+    assert "20,260 mD<br>\n<small>0 to 45,440 mD, cut at 0 mD</small>" in page
     assert page.count("data:image/svg+xml") == 1
 
 
