@@ -44,7 +44,7 @@ NETWORK_LAYERS = [
 CAMPAIGN_LAYERS = [["plan"], ["engine", "result"], ["page"], ["api"]]
 ROOMS = {"fdnet": LAYERS, "fdnet.campaign": CAMPAIGN_LAYERS, "fdnet.network": NETWORK_LAYERS}
 DOORS = {
-    "jinja2": {"dem/deck", "report/html", "campaign/page"},
+    "jinja2": {"dem/deck", "report/html"},
     "subprocess": {
         "campaign/engine",
         "dem/liggghts",
@@ -63,7 +63,7 @@ DOORS = {
     "vtkmodules": {"report/vtk", "spheres/vtk_file"},
     "imageio_ffmpeg": {"report/picture"},
     "openpnm": {"report/tables"},
-    "matplotlib": {"campaign/page", "report/figures"},
+    "matplotlib": {"report/figures"},
     "PIL": {"report/html", "report/picture"},
     "numba": {"network/compiled"},
     "pymetis": {"network/flow/solver"},

@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -247,29 +246,41 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
 
     Raises CaseError for a figure that cannot be read.
     """
-    from jinja2 import Environment, StrictUndefined
-
-    page = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    for one in (quantity, in_millidarcy, percent, multiplied, words):
-        page.filters[one.__name__] = one
-    page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
-    page.globals.update(shows=SHOWS, agrees=AGREES, columns=SECTION_COLUMNS)
-    figures = [
-        {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
-        for file, caption in parts.figures
-    ]
-    template = resources.files("fdnet.report").joinpath("report.html.j2").read_text("utf-8")
-    text = page.from_string(template).render(
+    figures = [shown_figure(Path(file), caption) for file, caption in parts.figures]
+    text = page_text(
+        "report/report.html.j2",
         summary=summary,
         parts=parts,
+        columns=SECTION_COLUMNS,
         figures=[one for one in figures if one["name"] not in (STILL, LEADING)],
         leading=[one for one in figures if one["name"] == LEADING],
         still=[one for one in figures if one["name"] == STILL],
         headline=list(facts(summary)) if "supplied_count" in summary else [],
     )
     return write_text(path, text)
+
+
+def page_text(template: str, **shown: Any) -> str:
+    """A page from its template, a path within fdnet; the style is that of page.html.j2."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    page = Environment(
+        loader=PackageLoader("fdnet", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    for one in (quantity, in_millidarcy, percent, multiplied, words):
+        page.filters[one.__name__] = one
+    page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
+    page.globals.update(shows=SHOWS, agrees=AGREES)
+    return page.get_template(template).render(**shown)
+
+
+def shown_figure(path: Path, caption: str) -> dict[str, str]:
+    """A figure as the macro `show` takes it. Raises CaseError where it cannot be read."""
+    return {"data": _data_uri(path), "caption": caption, "name": path.name}
 
 
 def quantity(value: Any, unit: str = "") -> str:

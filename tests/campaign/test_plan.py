@@ -177,16 +177,16 @@ def test_muds_are_ranked_by_their_bands(write, capsys):
     states = [(mud["name"], mud["state"]) for mud in made["design"]]
     assert states == [("good", "met"), ("close", "open"), ("bad", "missed")]
     assert made["targets"] == {"k_loss": pytest.approx(0.3)}
-    assert made["lines"][0].startswith("1. good meets every target: permeability lost 10 %")
+    assert made["lines"][0].startswith("1. good meets every target: permeability lost 10.0 %")
     assert "some 7 seeds would decide it" in made["lines"][1]
-    assert "1. good meets every target" in (write("").parent / "out/compare.html").read_text()
+    assert ">good meets every target" in (write("").parent / "out/compare.html").read_text()
 
 
 def test_bridging_is_the_share_that_passes(write, capsys):
     more = {"passed_count": [1, 3], "supplied_count": [100, 100]}
     targets = 'bridging = "1 %"\ndepth = "500 um"\nk_loss = "30 %"'
     made = designed(write, {"mud": [0.1, 0.2]}, targets, capsys, **more)
-    assert "pass through the specimen unbridged 2 % (95 %" in made["lines"][0]
+    assert "pass through the specimen unbridged 2.0 % (95 %" in made["lines"][0]
     assert made["targets"] == pytest.approx({"depth": 5e-4, "k_loss": 0.3, "bridging": 0.01})
 
 
