@@ -199,7 +199,10 @@ def completion(commands: Mapping[str, Parser], cases: Sequence[str]) -> str:
 
 
 _SCRIPT = """\
-[ -n "$ZSH_VERSION" ] && autoload -U +X bashcompinit && bashcompinit
+if [ -n "$ZSH_VERSION" ]; then
+  type compdef > /dev/null || {{ autoload -U compinit && compinit -i; }}
+  autoload -U +X bashcompinit && bashcompinit
+fi
 _fdnet() {{
   local word="${{COMP_WORDS[COMP_CWORD]}}" words=""
   case "${{COMP_WORDS[1]}} ${{COMP_WORDS[COMP_CWORD-1]}}" in

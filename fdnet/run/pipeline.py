@@ -101,7 +101,9 @@ def run_case(
         progress: whether to show the progress on the terminal.
 
     Returns:
-        The finished run, as `open_run` gives it; lengths in m, permeabilities in m2.
+        The finished run, as `open_run` gives it; lengths in m, permeabilities in m2. With `resume`
+        and without the stage "invade", an invasion that was cut is analysed as far as it is: the
+        `stop_reason` of this provisional run is "unfinished".
 
     Raises:
         CaseError: the case, `out` or `stages` cannot be used.
@@ -131,8 +133,10 @@ def run_case(
         show_progress=progress,
         command="fdnet.run_case",
     )
-    run_stages(given, options)
-    return open_run(options.out)
+    if run_stages(given, options).get("stop_reason") != "unfinished":
+        return open_run(options.out)
+    files = digests_of(options.out, [*TABLES, *SOME_TABLES, *MESHES])
+    return FinishedRun(path=options.out, case=given, manifest={"files": files, "invade": {}})
 
 
 def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
