@@ -15,9 +15,10 @@ out of phi. Derivations are on docs/theory/from_core_to_well.md.
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_banded
@@ -56,28 +57,17 @@ class Column:
         """(J,) m3 of each cell."""
         return self.area * self.width * (1.0 + (self.edges[1:] + self.edges[:-1]) / 2 / self.well)
 
-    def reach(self, depth: Array) -> Array:
+    def reach(self, depth: Any) -> Array:
         """Integral of dx / A from the face to depths (N,) m, 1/m; over k it is a resistance."""
-        if math.isinf(self.well):
-            return np.asarray(depth) / self.area
-        return np.log1p(np.asarray(depth) / self.well) * self.well / self.area
-
-    @property
-    def behind(self) -> float:
-        """Reach of the sound rock behind the cells, 1/m."""
-        first, last = self.reach(np.array([self.edges[-1], max(self.outer, self.edges[-1])]))
-        return float(last - first)
-
-
-def plain_grid(length: float, cells: int) -> Array:
-    """(J+1,) edges of equal cells, m."""
-    return np.linspace(0.0, length, cells + 1)
+        x = np.asarray(depth, float)
+        way = x if math.isinf(self.well) else np.log1p(x / self.well) * self.well
+        return np.asarray(way / self.area)
 
 
 def steep_grid(length: float, cells: int, first: float) -> Array:
     """(J+1,) edges, m, of cells that grow by one factor from `first` m at the face."""
     if first * cells >= length:
-        return plain_grid(length, cells)
+        return np.linspace(0.0, length, cells + 1)
 
     def excess(growth: float) -> float:
         return first * math.expm1(cells * growth) / math.expm1(growth) - length
@@ -130,8 +120,12 @@ class Drive(NamedTuple):
     """What drives the flow for so many `seconds`: `pressure` Pa or `rate` m3/s, below 0 back."""
 
     seconds: float
-    pressure: float | None = None
+    pressure: float = math.nan
     rate: float | None = None
+
+    def flow(self, resistance: float) -> float:
+        """m3/s through a resistance in Pa s/m3."""
+        return self.pressure / resistance if self.rate is None else self.rate
 
 
 class Release(NamedTuple):
@@ -139,6 +133,9 @@ class Release(NamedTuple):
 
     share: float
     rate: float
+
+
+NO_RELEASE = Release(0.0, 0.0)
 
 
 def cake_skin(shape: str, thickness: float, well: float) -> float:
@@ -150,12 +147,12 @@ def cake_skin(shape: str, thickness: float, well: float) -> float:
         thickness: h, m: volume of the cake over the area of the face.
         well: r, m.
     """
-    ratio = 0.0 if math.isinf(well) else thickness / well
-    if shape == "linear":
-        return ratio
-    if shape == "linrad":
-        return math.log1p(ratio)
-    return 0.5 * (math.log1p(2 * ratio) if shape == "radial" else -math.log1p(-2 * ratio))
+    ratio = thickness / well
+    if shape in ("linear", "linrad"):
+        return ratio if shape == "linear" else math.log1p(ratio)
+    if shape == "radial":
+        return 0.5 * math.log1p(2 * ratio)
+    return -0.5 * math.log1p(-2 * ratio) if 2 * ratio < 1 else math.inf
 
 
 def damage_skin(column: Column, loss: Array) -> float:
@@ -169,8 +166,7 @@ class State:
     """Where the fines of C classes are, in J cells.
 
     Attributes:
-        suspended: (C, J) volume of fines over volume of fluid.
-        deposit: (C, J) volume of fines over bulk volume.
+        suspended, deposit: (C, J) volume of fines over that of fluid, and over bulk volume.
         held: (C, J) part of the deposit that back-flow cannot take.
         face: deposit of all classes at the face itself.
         cake, supplied, passed, returned: (C,) m3 of fines in the cake, supplied with the mud, out
@@ -220,79 +216,6 @@ class March:
     stopped: str
 
 
-def _sweep(
-    inflow: Array, held: Array, pores: Array, catch: Array, volume: float
-) -> tuple[Array, Array]:
-    """Mean outflow and last concentration (J,) of cells in the order of the flow.
-
-    In each cell, of pore volume p, the flow of a `volume` V obeys p dc/dV = in - e^h c, h being
-    `catch` = rate times width: exact where nothing changes. `inflow` is what enters a cell other
-    than from the cell before; the mean outflow of that is passed on.
-    """
-    exponent = np.exp(catch)
-    decay = exponent * volume / pores
-    left = -np.expm1(-decay)
-    stay = left / decay
-    mean = (1.0 - stay) / exponent
-    bands = np.stack([np.ones_like(mean), np.append(-mean[1:], 0.0)])
-    outflow = solve_banded((1, 0), bands, held * stay + mean * inflow)
-    entered = inflow + np.append(0.0, outflow[:-1])
-    return outflow, entered * left / exponent + held * np.exp(-decay)
-
-
-def _forward(
-    state: State, column: Column, rock: Rock, mud: Sequence[FineClass], open_: bool, volume: float
-) -> tuple[State, Array]:
-    """The state after a `volume` m3 of inflow, and the mean effluent (C,); deposit half-way."""
-    pores, area, first = rock.porosity * column.volume, column.area, np.eye(len(column.width))[0]
-    rate, growth, c0 = (np.array([one[i] for one in mud]) for i in (2, 3, 1))
-    c0 = c0 if open_ else np.zeros_like(c0)
-    deposit = total = state.deposit.sum(axis=0)
-    for _ in range(2):
-        catch = rate[:, None] * (1.0 + growth[:, None] * total) * column.width
-        swept = [
-            _sweep(c * first, old, pores, one, volume)
-            for c, old, one in zip(c0, state.suspended, catch, strict=True)
-        ]
-        outflow, last = (np.stack(part) for part in zip(*swept, strict=True))
-        caught = np.expm1(catch) * outflow * volume / column.volume
-        total = deposit + caught.sum(axis=0) / 2
-    slope = np.sum(rate * growth * c0) / area * volume
-    begin = np.sum(rate * (1.0 + growth * state.face) * c0) / area * volume
-    after = replace(
-        state,
-        suspended=last,
-        deposit=state.deposit + caught,
-        face=state.face + begin * (math.expm1(slope) / slope if slope else 1.0),
-        supplied=state.supplied + c0 * volume,
-        passed=state.passed + outflow[:, -1] * volume,
-    )
-    return after, outflow[:, -1]
-
-
-def _backward(
-    state: State, column: Column, rock: Rock, release: Release, volume: float
-) -> tuple[State, Array]:
-    """The state after a `volume` m3 has flowed back, and the mean that leaves the face (C,)."""
-    pores, none = rock.porosity * column.volume, np.zeros(len(column.width))
-    gone = -np.expm1(-release.rate * column.width / column.volume * volume)
-    freed = (state.deposit - state.held) * gone
-    swept = [
-        _sweep(one[::-1], old[::-1], pores[::-1], none, volume)
-        for one, old in zip(freed * column.volume / volume, state.suspended, strict=True)
-    ]
-    outflow, last = (np.stack(part)[:, ::-1] for part in zip(*swept, strict=True))
-    loose = release.share * -math.expm1(-release.rate * volume / column.area)
-    after = replace(
-        state,
-        suspended=last,
-        deposit=state.deposit - freed,
-        face=state.face * (1.0 - loose),
-        returned=state.returned + outflow[:, 0] * volume,
-    )
-    return after, outflow[:, 0]
-
-
 def march(
     column: Column,
     rock: Rock,
@@ -302,7 +225,7 @@ def march(
     *,
     cake: CakeOf | None = None,
     closing: float = math.inf,
-    release: Release = Release(0.0, 0.0),
+    release: Release = NO_RELEASE,
     taps: Array | None = None,
     fineness: float = FINENESS,
 ) -> March:
@@ -320,102 +243,69 @@ def march(
         taps: (S+1,) m, depths between which sections are measured; by default the ends.
         fineness: largest relative step; the error falls with it to first order.
     """
-    cells = np.zeros((len(mud), len(column.width)))
-    none = np.zeros(len(mud))
+    cells, none = np.zeros((len(mud), len(column.width))), np.zeros(len(mud))
     state = State(
         **dict.fromkeys(("suspended", "deposit", "held"), cells),
         **dict.fromkeys(("cake", "supplied", "passed", "returned"), none),
         face=0.0,
     )
     taps = column.edges[[0, -1]] if taps is None else np.asarray(taps, float)
-    solids = np.array([one.concentration for one in mud])
-    reach = np.diff(column.reach(column.edges))
-    sound = np.diff(column.reach(taps))
-    full = math.inf
-    if cake and cake.shape == "inward" and math.isfinite(column.well):
-        full = 0.5 * column.well * (1 - 1e-3)
-
-    def parts_of(state: State) -> Array:
-        """(S+2,) resistances 1/m3 of cake, sections and the rest."""
-        cells = np.append(0.0, np.cumsum(reach * rock.loss(state.deposit)))
-        at = np.interp(column.reach(taps), column.reach(column.edges), cells)
-        rest = cells[-1] - at[-1] + column.behind
-        own = 0.0
-        if cake and state.cake.any():
-            thick = state.cake.sum() / ((1 - cake.porosity) * column.area)
-            unit = cake_skin(cake.shape, thick, column.well) * column.well / column.area
-            unit = thick / column.area if math.isinf(column.well) else unit
-            own = unit / cake.permeability
-        return np.array([own, *(np.diff(at) / rock.permeability), rest / rock.permeability])
-
+    resistances = partial(_resistances, column=column, rock=rock, cake=cake, taps=taps)
+    small = fineness / 10 * rock.porosity * float(column.volume.sum())
     time, filtrate, closed_at, stopped = 0.0, 0.0, None, ""
-    rows: list[tuple[float, float, float, float, Array, Array]] = []
-
-    def note(drive: Drive, effluent: Array) -> None:
-        parts = parts_of(state)
-        whole = viscosity * parts.sum()
-        flow = drive.pressure / whole if drive.rate is None else drive.rate
-        rows.append((time, filtrate, flow, flow * whole, flow * viscosity * parts, effluent))
-
+    parts, rows = resistances(state), []
     for drive in drives:
-        end, back = time + drive.seconds, (drive.rate or drive.pressure or 0.0) < 0
-        since = 0.0
+        end, since = time + drive.seconds, 0.0
+        back = (drive.pressure if drive.rate is None else drive.rate) < 0
         if back:
-            state = replace(
-                state,
-                returned=state.returned + state.cake,
-                cake=none,
-                held=np.maximum(state.held, (1 - release.share) * state.deposit),
-            )
+            held = np.maximum(state.held, (1 - release.share) * state.deposit)
+            returned = state.returned + state.cake
+            state = replace(state, returned=returned, cake=none, held=held)
+            parts = resistances(state)
         if not rows:
-            note(drive, none)
-        while time < end and not stopped:
-            shut = not back and state.face >= closing * (1 - 1e-12)
-            if shut and closed_at is None:
-                closed_at = time
-            if shut and cake is None:
-                stopped = "closed"
+            flow = drive.flow(viscosity * parts.sum())
+            rows.append((time, filtrate, flow, viscosity * flow * parts, none))
+        while time < end:
+            shut = not back and state.face >= closing
+            if shut:
+                closed_at = time if closed_at is None else closed_at
+                stopped = "" if cake else "closed"
+            if stopped:
                 break
-            step, to_closing = _largest(state, column, rock, mud, closing, since, fineness)
-            step = step if back or shut else min(step, to_closing)
-            before = parts_of(state).sum()
+            step, to_closing = fineness * since + small, math.inf
+            if not back and not shut:
+                most, to_closing = _until(state, column, rock, mud, closing, fineness)
+                step = min(step, most, to_closing)
             for _ in range(60):
                 if back:
                     after, effluent = _backward(state, column, rock, release, step)
                 else:
-                    after, effluent = _forward(state, column, rock, mud, not shut, step)
-                if shut and cake:
-                    built = (1 - cake.porosity) * solids / (1 - cake.porosity - solids.sum()) * step
-                    built = replace(
-                        after, cake=after.cake + built, supplied=after.supplied + built
-                    )
-                    after = built
-                whole = viscosity * (before + parts_of(after).sum()) / 2
-                flow = drive.pressure / whole if drive.rate is None else drive.rate
-                seconds = step / abs(flow)
-                over = (time + seconds - end) / drive.seconds
-                if over <= _LANDED:
+                    after, effluent = _forward(state, column, rock, mud, cake, shut, step)
+                new = resistances(after)
+                seconds = step / abs(drive.flow(viscosity * (parts + new).sum() / 2))
+                early = (end - time - seconds) / drive.seconds
+                if early >= -_LANDED or not np.isfinite(new).all():
                     break
                 step *= (end - time) / seconds
-            if shut and cake and after.cake.sum() / ((1 - cake.porosity) * column.area) > full:
+            if not np.isfinite(new).all():
                 stopped = "full"
                 break
-            state, since = after, since + step
-            time = end if over > -_LANDED else time + seconds
-            filtrate += -step if back else step
-            if not shut and not back and step == to_closing:
-                since, state = 0.0, replace(state, face=closing)
-            note(drive, effluent)
-    columns = zip(*rows, strict=True)
-    times, volumes, rates, pressures, parts, effluents = (np.array(one) for one in columns)
-    inner = parts[:, 1:-1] / (viscosity * rates[:, None])
+            time = end if early <= _LANDED else time + seconds
+            filtrate, since = filtrate + (-step if back else step), since + step
+            if step == to_closing:
+                after, since = replace(after, face=closing), 0.0
+            state, parts = after, new
+            flow = drive.flow(viscosity * parts.sum())
+            rows.append((time, filtrate, flow, viscosity * flow * parts, effluent))
+    times, volumes, rates, drops, effluents = (np.array(one) for one in zip(*rows, strict=True))
+    clean = np.diff(column.reach(taps)) / rock.permeability
     return March(
         time=times,
         filtrate=volumes,
         rate=rates,
-        pressure=pressures,
-        parts=parts,
-        k_over_k0=sound / rock.permeability / inner,
+        pressure=drops.sum(axis=1),
+        parts=drops,
+        k_over_k0=clean * viscosity * rates[:, None] / drops[:, 1:-1],
         effluent=effluents,
         end=state,
         closed_at=closed_at,
@@ -423,26 +313,127 @@ def march(
     )
 
 
-def _largest(
+def _resistances(
+    state: State, column: Column, rock: Rock, cake: CakeOf | None, taps: Array
+) -> Array:
+    """(S+2,) resistances over viscosity, 1/m3, of cake, sections and the rest of the way.
+
+    That of a cake which fills the well is infinite.
+    """
+    reach, at = column.reach(column.edges), column.reach(taps)
+    cells = np.append(0.0, np.cumsum(np.diff(reach) * rock.loss(state.deposit)))
+    inside = np.interp(at, reach, cells)
+    outer = float(column.reach(max(column.outer, column.edges[-1])) - reach[-1])
+    own = 0.0
+    if cake and state.cake.any():
+        thick = state.cake.sum() / ((1 - cake.porosity) * column.area)
+        straight = thick / column.area
+        round_ = cake_skin(cake.shape, thick, column.well) * column.well / column.area
+        own = (straight if math.isinf(column.well) else round_) * rock.permeability
+        own /= cake.permeability
+    ends = cells[-1] - inside[-1] + outer
+    return np.array([own, *np.diff(inside), ends]) / rock.permeability
+
+
+def _until(
     state: State,
     column: Column,
     rock: Rock,
     mud: Sequence[FineClass],
     closing: float,
-    since: float,
     fineness: float,
 ) -> tuple[float, float]:
-    """Volume m3 of the next step, and that until the face closes (infinite: never)."""
+    """Volume m3 in which the face changes little, and that until it closes (infinite: never)."""
     start = sum(one.rate * (1 + one.growth * state.face) * one.concentration for one in mud)
     slope = sum(one.rate * one.growth * one.concentration for one in mud)
-    area = column.area
-    limits = [fineness * since + fineness * rock.porosity * float(column.volume.sum()) / 10]
-    limits += [2 * fineness * area / abs(slope)] if slope else []
+    limits = [2 * fineness / abs(slope)] if slope else []
     if start > 0 and rock.damage > 0:
-        limits.append(fineness * (1 / rock.damage + state.face) / rock.power * area / start)
-    if start <= 0 or math.isinf(closing):
-        return min(limits), math.inf
-    full = (closing - state.face) / start
-    if slope and 1 + full * slope <= 0:
-        return min(limits), math.inf
-    return min(limits), area * (math.log1p(full * slope) / slope if slope else full)
+        limits.append(fineness * (1 / rock.damage + state.face) / rock.power / start)
+    full = (closing - state.face) / start if start > 0 else math.inf
+    if slope:
+        full = math.log1p(full * slope) / slope if full * slope > -1 else math.inf
+    return column.area * min(limits, default=math.inf), column.area * full
+
+
+def _forward(
+    state: State,
+    column: Column,
+    rock: Rock,
+    mud: Sequence[FineClass],
+    cake: CakeOf | None,
+    shut: bool,
+    volume: float,
+) -> tuple[State, Array]:
+    """The state after a `volume` m3 of inflow, and the mean effluent (C,).
+
+    The filtration coefficients are those of the deposit half-way. Through a shut face no fines
+    enter; the mud whose place the cake takes brings its own solids.
+    """
+    _, solids, rate, growth = (np.array(one) for one in zip(*mud, strict=True))
+    if shut and cake:
+        free = 1 - cake.porosity
+        built = free * solids / (free - solids.sum()) * volume
+        state = replace(state, cake=state.cake + built, supplied=state.supplied + built)
+        if not state.suspended.any():
+            return state, np.zeros(len(mud))
+        solids = 0.0 * solids
+    first, pores = np.eye(1, len(column.width))[0], rock.porosity * column.volume
+    total = before = state.deposit.sum(axis=0)
+    for _ in range(2 if growth.any() else 1):
+        catch = rate[:, None] * (1 + growth[:, None] * total) * column.width
+        out, last = _sweep(solids[:, None] * first, state.suspended, pores, catch, volume)
+        caught = np.expm1(catch) * out * volume / column.volume
+        total = before + caught.sum(axis=0) / 2
+    start = float(np.sum(rate * (1 + growth * state.face) * solids)) * volume / column.area
+    slope = float(np.sum(rate * growth * solids)) * volume / column.area
+    after = replace(
+        state,
+        suspended=last,
+        deposit=state.deposit + caught,
+        face=state.face + start * (math.expm1(slope) / slope if slope else 1.0),
+        supplied=state.supplied + solids * volume,
+        passed=state.passed + out[:, -1] * volume,
+    )
+    return after, out[:, -1]
+
+
+def _backward(
+    state: State, column: Column, rock: Rock, release: Release, volume: float
+) -> tuple[State, Array]:
+    """The state after a `volume` m3 has flowed back, and the mean that leaves the face (C,)."""
+    pores = rock.porosity * column.volume
+    gone = -np.expm1(-release.rate * column.width / column.volume * volume)
+    freed = (state.deposit - state.held) * gone
+    inflow, none = freed * column.volume / volume, np.zeros_like(freed)
+    out, last = _sweep(inflow[:, ::-1], state.suspended[:, ::-1], pores[::-1], none, volume)
+    loose = release.share * -math.expm1(-release.rate * volume / column.area)
+    after = replace(
+        state,
+        suspended=last[:, ::-1],
+        deposit=state.deposit - freed,
+        face=state.face * (1 - loose),
+        returned=state.returned + out[:, -1] * volume,
+    )
+    return after, out[:, -1]
+
+
+def _sweep(
+    inflow: Array, held: Array, pores: Array, catch: Array, volume: float
+) -> tuple[Array, Array]:
+    """Mean outflow and last concentration (C, J) of cells in the order of the flow.
+
+    In each cell, of pore volume p, the flow of a `volume` V obeys p dc/dV = in - e^h c, h being
+    `catch` = rate times width: exact where nothing changes. `inflow` is what enters a cell other
+    than from the cell before; the mean outflow of that is passed on.
+    """
+    exponent = np.exp(catch)
+    decay = exponent * volume / pores
+    left = -np.expm1(-decay)
+    stay = left / decay
+    on = (1 - stay) / exponent
+    out = np.empty_like(held)
+    for one, (pass_on, own) in enumerate(zip(on, held * stay + on * inflow, strict=True)):
+        bands = np.stack([np.ones_like(pass_on), np.append(-pass_on[1:], 0.0)])
+        out[one] = solve_banded((1, 0), bands, own, check_finite=False)
+    entered = inflow + np.pad(out[:, :-1], ((0, 0), (1, 0)))
+    return out, entered * left / exponent + held * np.exp(-decay)
