@@ -18,7 +18,7 @@ LAYERS = [
     ["sizes", "statistics"],
     ["spheres", "case"],
     ["scales", "network"],
-    ["mechanics"],
+    ["mechanics", "classes"],
     ["dem", "report"],
     ["run"],
     ["campaign"],
