@@ -97,8 +97,8 @@ def write_comparison(
     results.write_table(comparison)
     muds, ranking = candidates(comparison, limits or {}), ranking_lines(comparison)
     pairs, judged = pair_lines(comparison), [mud.line for mud in muds]
-    design = [{"name": mud.name, "state": mud.state} for mud in muds]
-    more = {"design": design, "targets": limits} if limits else {}
+    states = [{"name": mud.name, "state": mud.state} for mud in muds]
+    more = {"candidates": states, "targets": limits} if limits else {}
     summary = results.write_summary(comparison, more)
     trim: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True}
     environment = Environment(autoescape=True, undefined=StrictUndefined, **trim)
