@@ -93,8 +93,8 @@ def write_comparison(
     """Write table.csv, summary.json, figures and compare.html; `limits` (SI) are of targets."""
     results.write_table(comparison)
     muds, made = candidates(comparison, limits or {}), compared(comparison)
-    design = [{"name": mud.name, "state": mud.state} for mud in muds]
-    more = {"design": design, "targets": limits} if limits else {}
+    states = [{"name": mud.name, "state": mud.state} for mud in muds]
+    more = {"candidates": states, "targets": limits} if limits else {}
     summary = results.write_summary(comparison, more)
     judged, shown = [mud.line for mud in muds], dict.fromkeys([comparison.ranked_by, *SHOWN])
     text = html.page_text(

@@ -566,11 +566,7 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
                 f"drag.{key}: {getattr(drag, key)!r} belongs to drag.field 'network'; the uniform "
                 "field always has its first velocity; leave it out"
             )
-    if (
-        good("drag.field", "grains.motion")
-        and drag.field == "network"
-        and grains.motion == "mobile"
-    ):
+    if good("drag.field", "grains.motion") and drag.coupled and grains.motion == "mobile":
         yield (
             "grains.motion: 'mobile' with drag.field 'network', whose pores are those of grains "
             "that stay; take 'fixed', or set drag.field = 'uniform'"

@@ -324,7 +324,7 @@ class Drag(Part):
     @property
     def slowed(self) -> bool:
         """Whether the deposit slows the mud down."""
-        return self.field == "network" and self.drive != "rate"
+        return self.coupled and self.drive != "rate"
 
     @property
     def travel_diameters(self) -> float:

@@ -67,6 +67,7 @@ def _forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
         plug=0 if case.run.duration_s is not None else round(scales.plug_time / step),
         cap=math.ceil(scales.cap_time / step),
         allowed=case.run.plug_rate * arrivals * step,
+        chunk=scales.checkpoint_steps,
     )
 
 

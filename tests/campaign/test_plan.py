@@ -174,7 +174,7 @@ def test_muds_are_ranked_by_their_bands(write, capsys):
         for name, mean in (("bad", 0.5), ("close", 0.29), ("good", 0.1))
     }
     made = designed(write, losses, 'k_loss = "30 %"', capsys)
-    states = [(mud["name"], mud["state"]) for mud in made["design"]]
+    states = [(mud["name"], mud["state"]) for mud in made["candidates"]]
     assert states == [("good", "met"), ("close", "open"), ("bad", "missed")]
     assert made["targets"] == {"k_loss": pytest.approx(0.3)}
     assert made["lines"][0].startswith("1. good meets every target: permeability lost 10.0 %")
