@@ -29,7 +29,7 @@ def test_the_band_of_a_mean_is_students(tmp_path):
     assert summary["skin"]["seeds"] == 5
     single = compared(tmp_path / "one", {"a": [0.4]})
     assert ends(single.summary["k_reduction"]) == (0.4, None, None)
-    assert str(single) == "a: permeability lost 40.0 % (no band: one run), 1 seed."
+    assert single.ranking == ("a: permeability lost 40.0 % (no band: one run), 1 seed.",)
 
 
 def test_a_paired_difference_is_that_of_students_sleep_data(tmp_path):
