@@ -81,8 +81,12 @@ class Compared:
         return figures.shown(partial(_fill_depth, comparison=self.comparison))[0]
 
     def __str__(self) -> str:
-        """The ranking and the differences."""
-        return "\n".join([*self.ranking, *self.differences])
+        """The ranking and the differences; of one variant the other quantities of the page."""
+        variants, more = self.comparison.variants, list[str]()
+        for quantity in _shown(self.comparison)[1:] if len(variants) == 1 else ():
+            band = self.comparison.band(variants[0], quantity)
+            more.append(f"{label(quantity)}: {band_text(quantity, band)}")
+        return "\n".join([*self.ranking, *more, *self.differences])
 
     __repr__ = __str__
 
@@ -96,7 +100,7 @@ def write_comparison(
     states = [{"name": mud.name, "state": mud.state} for mud in muds]
     more = {"candidates": states, "targets": limits} if limits else {}
     summary = results.write_summary(comparison, more)
-    judged, shown = [mud.line for mud in muds], dict.fromkeys([comparison.ranked_by, *SHOWN])
+    judged = [mud.line for mud in muds]
     text = html.page_text(
         "campaign/compare.html.j2",
         comparison=comparison,
@@ -105,7 +109,7 @@ def write_comparison(
         ranking=[re.sub(r"^\d+\. ", "", line) for line in judged or made.ranking],
         pairs=made.differences,
         figures=_draw(comparison),
-        columns=[one for one in shown if one in comparison.numbers],
+        columns=_shown(comparison),
         slabs=sorted(int(one[1]) for one in map(_EDGE.fullmatch, comparison.numbers) if one),
         layers=[one for one in html.SECTION_COLUMNS[3:] if one[0] in LAYERS],
         label=label,
@@ -116,6 +120,12 @@ def write_comparison(
     )
     write_text(comparison.path / results.PAGE, text)
     return replace(made, summary=summary, ranking=(*judged, *made.ranking))
+
+
+def _shown(comparison: Comparison) -> list[str]:
+    """The ranked quantity, and those of `SHOWN` that are known."""
+    every = dict.fromkeys([comparison.ranked_by, *SHOWN])
+    return [one for one in every if one in comparison.numbers]
 
 
 _EDGE = re.compile(r"sections\.(\d+)\.x_lo_m")
@@ -139,6 +149,7 @@ def compared(comparison: Comparison) -> Compared:
 # ---- Sentences.
 LABELS = {
     "k_reduction": "permeability lost",
+    "skin": "skin of the well",
     "damage.face_lost": "permeability lost by the layer at the face",
     "k_damaged_m2": "damaged permeability",
     "invasion_depth_p95_m": "depth above which 95 % of the fines lie",

@@ -301,9 +301,9 @@ def facts(summary: Mapping[str, Any]) -> Iterator[Fact]:
         )
     if flow is not None:
         yield Fact(
-            "flow",
+            "k of the flow",
             f"{percent(1 - flow)} % lost",
-            f"as the flow met it last: {FLOW_LAW} (k_over_k0 of history.csv)",
+            f"as the simulated flow met it last: {FLOW_LAW} (k_over_k0 of history.csv)",
         )
     porosity = f"{summary['porosity_initial']:.4f}"
     yield Fact(

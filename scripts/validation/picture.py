@@ -40,9 +40,7 @@ def draw(panels: Sequence[Mapping[str, Any]], rows: pd.DataFrame, path: Path) ->
     _save(path, heights or [HEIGHT], fill)
 
 
-def _save(
-    path: Path, heights: Sequence[float], fill: Callable[[Sequence["Axes"]], None]
-) -> None:
+def _save(path: Path, heights: Sequence[float], fill: Callable[[Sequence["Axes"]], None]) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 

@@ -49,6 +49,19 @@ def planned(path: Path) -> tuple[dict, dict]:
     }
 
 
+def test_a_dry_run_says_the_time_and_writes_nothing(write, tmp_path, capsys):
+    path = write(GRID)
+    words = ["sweep", str(path), "--out", str(tmp_path / "out"), "--dry-run"]
+    assert main(words) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == 7
+    assert said[-1].startswith("12 runs: ")
+    assert said[-1].endswith("2 packs of grains serve several runs")
+    assert not (tmp_path / "out").exists()
+    assert main(["check", str(path)]) == 2
+    assert "is a sweep file and no case; fdnet sweep takes it" in capsys.readouterr().err
+
+
 def test_a_grid_is_every_combination_with_every_seed(write):
     """Fines and fluid are none of a pack's business: runs of one seed share theirs."""
     plan, cases = planned(write(GRID))
