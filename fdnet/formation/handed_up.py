@@ -150,6 +150,8 @@ def hand_up(source: str | Path | FinishedRun, *, classes: int = 1) -> list[Hande
     if is_run_folder(folder) or not folder.is_dir():
         return _of_run(open_run(folder), classes)
     comparison = open_runs(folder).comparison
+    if not comparison.done:
+        raise CaseError(f"{folder}: no run of it is finished; run it first")
     if len(comparison.variants) > 1:
         raise CaseError(
             f"{folder}: holds {len(comparison.variants)} variants, expected runs of one case that "
