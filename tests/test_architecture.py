@@ -22,6 +22,7 @@ LAYERS = [
     ["dem", "report"],
     ["run"],
     ["campaign"],
+    ["formation"],
     ["commands"],
     ["cli"],
     ["__main__"],
@@ -41,8 +42,14 @@ NETWORK_LAYERS = [
     ["permeability"],
     ["warm_up"],
 ]
+FORMATION_LAYERS = [["model"], ["handed_up"], ["scale_up"]]
 CAMPAIGN_LAYERS = [["plan"], ["engine", "result"], ["page"], ["api"]]
-ROOMS = {"fdnet": LAYERS, "fdnet.campaign": CAMPAIGN_LAYERS, "fdnet.network": NETWORK_LAYERS}
+ROOMS = {
+    "fdnet": LAYERS,
+    "fdnet.campaign": CAMPAIGN_LAYERS,
+    "fdnet.formation": FORMATION_LAYERS,
+    "fdnet.network": NETWORK_LAYERS,
+}
 DOORS = {
     "jinja2": {"dem/deck", "report/html"},
     "subprocess": {

@@ -253,7 +253,7 @@ def march(
     resistances = partial(_resistances, column=column, rock=rock, cake=cake, taps=taps)
     small = fineness / 10 * rock.porosity * float(column.volume.sum())
     time, filtrate, closed_at, stopped = 0.0, 0.0, None, ""
-    parts, rows = resistances(state), []
+    parts, rows = resistances(state), list[tuple[Any, ...]]()
     for drive in drives:
         end, since = time + drive.seconds, 0.0
         back = (drive.pressure if drive.rate is None else drive.rate) < 0
@@ -282,9 +282,11 @@ def march(
                 else:
                     after, effluent = _forward(state, column, rock, mud, cake, shut, step)
                 new = resistances(after)
+                if not np.isfinite(new).all():
+                    break
                 seconds = step / abs(drive.flow(viscosity * (parts + new).sum() / 2))
                 early = (end - time - seconds) / drive.seconds
-                if early >= -_LANDED or not np.isfinite(new).all():
+                if early >= -_LANDED:
                     break
                 step *= (end - time) / seconds
             if not np.isfinite(new).all():
@@ -327,10 +329,10 @@ def _resistances(
     own = 0.0
     if cake and state.cake.any():
         thick = state.cake.sum() / ((1 - cake.porosity) * column.area)
-        straight = thick / column.area
-        round_ = cake_skin(cake.shape, thick, column.well) * column.well / column.area
-        own = (straight if math.isinf(column.well) else round_) * rock.permeability
-        own /= cake.permeability
+        own = thick / column.area
+        if math.isfinite(column.well):
+            own = cake_skin(cake.shape, thick, column.well) * column.well / column.area
+        own *= rock.permeability / cake.permeability
     ends = cells[-1] - inside[-1] + outer
     return np.array([own, *np.diff(inside), ends]) / rock.permeability
 

@@ -124,7 +124,7 @@ OUTPUTS = {
     "pack": ("pack", "mechanics"),
     "invade": ("invade", "stokes"),
     "clean_up": ("clean_up",),
-    "analyse": (*TABLES, *SOME_TABLES),
+    "analyse": (*TABLES, *SOME_TABLES, "formation"),
     "report": (
         "figures",
         "frames",
@@ -136,8 +136,8 @@ OUTPUTS = {
     ),
 }
 """Files and folders that each stage writes, below the run folder."""
-OPTIONAL = ("layers.csv", "history.csv", *SOME_TABLES)
-"""Those of them that a finished stage may lack."""
+OPTIONAL = ("layers.csv", "history.csv", *SOME_TABLES, "formation")
+"""Those of them that a finished stage may lack; `formation` is of `fdnet core` and `well`."""
 
 
 class _Execution(JsonObject):
