@@ -120,14 +120,18 @@ class Deposits:
     @property
     def missing(self) -> Array:
         """(C,) what the ledger does not find again, over what was supplied; rounding."""
-        inside = sum(one.sum(axis=0) for one in self.inside)
-        found = inside + self.cake + self.passed
+        found = self.inside_by_class + self.cake + self.passed
         return np.asarray((self.supplied - found) / np.maximum(self.supplied, 1e-300))
 
     @property
     def inside(self) -> tuple[Array, Array, Array, Array]:
         """What is in the specimen, by pore or throat."""
         return self.carried, self.in_pores, self.attached, self.in_throats
+
+    @property
+    def inside_by_class(self) -> Array:
+        """(C,) m3 in the specimen."""
+        return np.sum([one.sum(axis=0) for one in self.inside], axis=0)
 
 
 def no_solids(sieve: Sieve, classes: SizeClasses) -> Deposits:

@@ -268,6 +268,7 @@ class FinishedInvasion:
         history: one row a checkpoint.
         damaged: grains and all remaining fines at the end.
         updates: the record of a coupled invasion, one row an update; empty of others.
+        rows: of history.csv, where the fast model made it; empty of others.
     """
 
     case: InvasionCase
@@ -275,6 +276,7 @@ class FinishedInvasion:
     history: tuple[Checkpoint, ...]
     damaged: Snapshot
     updates: tuple[Mapping[str, float], ...] = ()
+    rows: tuple[dict[str, float], ...] = ()
 
 
 # ------------------------------------------------------------------------------------------------
