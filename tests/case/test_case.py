@@ -267,7 +267,10 @@ def test_bad_input_is_one_clear_error(tmp_path, capsys):
             ({"mud": '{ D10 = "20 um", D50_mm = 0.04, D50 = "40 um" }'}, "give one of the two"),
             ({"sand": SAND.replace("0.25 mm", "0.25")}, "'0.25': has no unit"),
             ({"mud": '{ D10 = "420 um", D50 = "430 um", D90 = "440 um" }'}, "above every throat"),
-            ({"mud": '{ D10 = "50 um", D50 = "150 um", D90 = "300 um" }'}, "is not below"),
+            (
+                {"mud": '{ D10 = "50 um", D50 = "150 um", D90 = "300 um" }'},
+                "solids as large as the grains",
+            ),
             (
                 {
                     "sand": '{ D50 = "0.40 mm", D90 = "0.402 mm" }',
