@@ -57,7 +57,7 @@ def test_every_problem_is_listed_at_once():
 
 def test_a_bad_value_is_named_with_its_path():
     for part, values, expected in [
-        ("fines", {"radius_mm": 0.3}, "not below grains.radius_mm 0.25"),
+        ("fines", {"radius_mm": 0.3}, "expected below grains.radius_mm 0.25"),
         ("fines", {"slab_mm": 2.0}, "give one of the two, or none"),
         ("fines", {"concentration": 0.4}, "fines.concentration: 0.4"),
         ("grains", {"radius_mm": [0.3, 0.2]}, "must rise"),
