@@ -5,7 +5,7 @@
     .venv/bin/python scripts/validation.py list
 
 NAME runs a study, or goes on with it; `NAME --help` says what else it takes. Comparisons with
-commands of their own: accuracy, benchmark, truth, outside, mechanics, bridging, thesis.
+commands of their own: accuracy, benchmark, truth, outside, mechanics, bridging, classes, thesis.
 """
 
 import sys
@@ -21,6 +21,7 @@ CHAPTERS: dict[str, str] = {
     "outside": "validation.outside",
     "mechanics": "validation.mechanics",
     "bridging": "validation.bridging",
+    "classes": "validation.classes",
     "thesis": "validation.thesis.command",
 }
 """Name and module of the comparisons with a command of their own, `main(arguments) -> int`.

@@ -499,9 +499,9 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
         and not list(_some_throat(grains, fines))
     ):
         yield (
-            f"{size_text('fines', fines)} is not below {size_text('grains', grains)} "
-            "(the network needs a clear gap)"
-            + ("; narrow sizes.cut_percent of one" if fines.measured or grains.measured else "")
+            f"{size_text('fines', fines)}, expected below {size_text('grains', grains)}: "
+            "solids as large as the grains only lie in the cake"
+            + ("; leave them out by fines.sizes.cut_percent" if fines.measured else "")
         )
     if good("grains.radius_mm", "fines.radius_mm"):
         yield from _some_throat(grains, fines)

@@ -211,11 +211,11 @@ class Checkpoints:
             usable.append((row, record))
         return next((row for row, record in reversed(usable) if self._is_whole(row, record)), None)
 
-    def has_its_dump(self, step: int) -> bool:
-        """Whether the dump of a checkpoint is as it was recorded."""
+    def holds(self, step: int, suffix: str) -> bool:
+        """Whether the "dump" or "restart" of a checkpoint is as it was recorded."""
         record = self.record(step)
         try:
-            return record is not None and file_digest(self.path(step, "dump")) == record.dump
+            return file_digest(self.path(step, suffix)) == getattr(record, suffix, None)
         except OSError:
             return False
 
@@ -641,31 +641,6 @@ def cut_watch(folder: Path, last_step: int) -> None:
     if (folder / WATCH).exists():
         rows = [row for row in read_watch(folder) if row.step <= last_step]
         write_text(folder / WATCH, "".join(f"{row.step},{row.fraction!r}\n" for row in rows))
-
-
-class WatchReader:
-    """Reads what is new in overlap.csv, at each checkpoint of a run.
-
-    It begins at the end of the file, which holds what earlier sessions measured.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.path = folder / WATCH
-        self.waiting: list[Deepest] = []
-        self.offset = self.path.stat().st_size if self.path.exists() else 0
-
-    def upto(self, step: int) -> list[Deepest]:
-        """The new rows up to `step`; later ones are kept for the next checkpoint."""
-        if self.path.exists():
-            with self.path.open("rb") as file:
-                file.seek(self.offset)
-                text = file.read()
-            whole = text[: text.rfind(b"\n") + 1]
-            self.offset += len(whole)
-            self.waiting += _watched(whole.decode(errors="replace").splitlines())
-        rows = [row for row in self.waiting if row.step <= step]
-        self.waiting = [row for row in self.waiting if row.step > step]
-        return rows
 
 
 def overlap_in(case: Case, state: Snapshot) -> Deepest:

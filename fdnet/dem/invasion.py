@@ -25,7 +25,6 @@ from fdnet.dem.checkpoint import (
     Checkpoints,
     Deepest,
     Updates,
-    WatchReader,
     chunks_of,
     deepest_of,
     entered_by,
@@ -181,24 +180,25 @@ class ChunkedStage(ABC):
         after a failed write and ends with exit code 0. Older restarts are removed only while there
         is room on the disk.
         """
-        watch = WatchReader(self.folder)
 
         def follow(line: str) -> None:
             if line.startswith(self.mark):
-                self._keep(int(line.split()[3]), watch)
+                self._keep(int(line.split()[3]))
             if self.launch.follow:
                 self.launch.follow(line)
 
         return follow
 
-    def _keep(self, step: int, watch: WatchReader) -> None:
+    def _keep(self, step: int) -> None:
         if disk_is_full(self.folder):
             raise LiggghtsError(
                 f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
                 "continue with --resume"
             )
-        rows = [row for row in read_rows(self.folder, self.points.kind) if row.step == step][-1:]
-        overlaps = watch.upto(step)
+        past = [row for row in read_rows(self.folder, self.points.kind) if row.step <= step]
+        rows = [row for row in past if row.step == step][-1:]
+        since = max((row.step for row in past if row.step < step), default=-1)
+        overlaps = [one for one in read_watch(self.folder) if since < one.step <= step]
         for row in rows:
             self.points.keep(row, ranks=self.launch.ranks, overlaps=overlaps)
         if not rows and self.points.stage == "invade" and self.case.run.on_overlap == "stop":
@@ -249,14 +249,13 @@ class ChunkedStage(ABC):
         time = self.time_at(last, done * self.scales.checkpoint_steps / pace.checkpoint_steps)
         frame, dt = self.shown(feed), pace.time_step
         spheres, density = self.spheres(frame, time), fine_density(frame)
-        shows = GIVEN[0] in frame.columns
         moment = Moment(
             step=step,
             time=time,
             before=updates.last,
             fresh=done == 0,
             left=left * dt,
-            given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0) if shows else None,
+            given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0),
             density=density,
         )
         assert self.fluid is not None
@@ -386,7 +385,7 @@ class InvadeStage(ChunkedStage):
         def lasting(first: int, row: Checkpoint) -> float:
             seen = [one.fraction for one in watched if first < one.step <= row.step]
             if not seen:
-                if row is not last and not self.points.has_its_dump(row.step):
+                if row is not last and not self.points.holds(row.step, "dump"):
                     raise LiggghtsError(
                         f"{self.points.path(row.step, 'dump')}: is missing, or not as it was "
                         "recorded, and the springs of the next chunk follow from it; put it back, "

@@ -43,9 +43,6 @@ from fdnet.scales.flow import darcy_through, path_of
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Snapshot
 
-CROWD_COLUMNS = ("factor_mean", "factor_most", "porosity_least", "porosity_capped")
-"""Mean and largest factor on the drag, least porosity, fines whose porosity was capped."""
-
 
 def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, slip: Array) -> Array:
     """Factor (N,) on the drag of lone fines of `radius` m and superficial `slip` m/s.
@@ -55,17 +52,6 @@ def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, sli
     reynolds = scales.push.reynolds_slope * radius / near.size_ratio * slip
     crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
     return crowd_drag_factor(crowd) / near.porosity
-
-
-def crowd_measures(factor: Array, near: Neighbourhood) -> dict[str, float]:
-    """`CROWD_COLUMNS`, from the `factor` (N,) on the drag of fines."""
-    values = (
-        float(np.mean(factor)) if len(factor) else 1.0,
-        float(np.max(factor, initial=1.0)),
-        float(np.min(near.porosity, initial=1.0)),
-        near.capped,
-    )
-    return dict(zip(CROWD_COLUMNS, values, strict=True))
 
 
 def _speed(velocity: Array) -> Array:
@@ -260,7 +246,7 @@ class NetworkFluid:
             "velocity_m_s",
             *FLOW_COLUMNS,
             *(() if self.finer is None else CLASS_COLUMNS),
-            *CROWD_COLUMNS,
+            *("factor_mean", "factor_most", "porosity_least", "porosity_capped"),
             "pores_stagnant",
             "fines_standing",
         )
@@ -390,9 +376,12 @@ class NetworkFluid:
             velocity=velocity,
             push=push,
             pace=speed / scales.porosity,
-            measures=crowd_measures(factor, near)
-            | {
+            measures={
                 "velocity_m_s": speed,
+                "factor_mean": float(np.mean(factor)) if len(factor) else 1.0,
+                "factor_most": float(np.max(factor, initial=1.0)),
+                "porosity_least": float(np.min(near.porosity, initial=1.0)),
+                "porosity_capped": near.capped,
                 "rate_m3_s": speed / driven * pack.network.area,
                 "rate_over_initial": speed / self.first_velocity,
                 "filtrate_m3": filtrate,
