@@ -110,18 +110,20 @@ def wider_share(classes: SizeClasses, passage: Array) -> Array:
     return np.clip((high - way) / width, 0.0, 1.0)
 
 
-BRIDGED = np.array(
-    [(0.0, 0.0), (0.2, 0.0), (0.29, 0.022), (0.45, 0.027), (0.57, 0.037), (0.9, 0.08), (1.0, 0.08)]
-)
-"""Chance per arrival that a throat stops a fine, by diameter over passage."""
+BRIDGED = ((0.65, 0.0), (0.725, 0.03), (0.9, 0.07))
+"""Chance per arrival that an empty throat stops a fine, by diameter over passage."""
 
 
 def bridging_chance(ratio: Array) -> Array:
-    """Chance per arrival that a throat stops a fine narrower than it; `ratio` is d over passage.
+    """Chance per arrival that an empty throat stops a fine narrower than it, by d over passage.
 
     0 from 1 on, where `wider_share` holds all.
     """
-    return np.where(ratio < 1.0, np.interp(ratio, *BRIDGED.T), 0.0)
+    return np.where(
+        ratio < 1.0,
+        np.interp(ratio, [one for one, _ in BRIDGED], [one for _, one in BRIDGED]),
+        0.0,
+    )
 
 
 # ------------------------------------------------------------------------------------------------
