@@ -147,14 +147,15 @@ def velocity_in(course: Course, k_over_k0: float, cake: float) -> float:
     return course.velocity * (1.0 + course.rest) / resistance
 
 
-def cake_resistance(course: Course, sieve: Sieve, solids: Deposits, classes: SizeClasses) -> float:
-    """1/m, of the cake: its thickness over its permeability."""
+def cake_resistance(
+    given: float | None, sieve: Sieve, solids: Deposits, classes: SizeClasses
+) -> float:
+    """1/m, of the cake: its thickness over its permeability, `given` in m2 or that of its bed."""
     thickness = thickness_of_cake(sieve, solids)
     if thickness <= 0:
         return 0.0
     size = float(bed_diameter(solids.cake, classes))
-    permeability = course.cake_permeability or carman_kozeny(PACKED, size)
-    return thickness / permeability
+    return thickness / (given or carman_kozeny(PACKED, size))
 
 
 def invade_classes(
@@ -166,7 +167,7 @@ def invade_classes(
     wanted, quiet, reason, mud = FIRST_STEP * pores, 0.0, "", float(classes.concentration.sum())
     state = flow_with(kept)
     for _ in range(MOST_STEPS):
-        cake = cake_resistance(course, sieve, solids, classes)
+        cake = cake_resistance(course.cake_permeability, sieve, solids, classes)
         velocity = velocity_in(course, state.k_over_k0, cake)
         rows.append(_row(course, sieve, solids, time, filtrate, velocity, state.k_over_k0, cake))
         by_class.append([solids.inside_by_class, solids.passed, solids.cake])

@@ -35,7 +35,7 @@ from fdnet.spheres.snapshot import Snapshot
 HISTORY, UPDATES, WATCH = "history.csv", "updates.csv", "overlap.csv"
 DOUBTS = "doubts.txt"
 """Warnings of the sessions that went on from an earlier checkpoint than they could."""
-_SUFFIXES = "dump|restart|unreadable|record"
+_SUFFIXES = "dump|restart|npz|unreadable|record"
 
 
 class Checkpoint(NamedTuple):
@@ -95,6 +95,7 @@ class Record(NamedTuple):
         dump: the dump.
         restart: the restart.
         updates: the updates of a coupled stage before the checkpoint.
+        fluid: what the fluid of a coupled stage remembers; "" where that is nothing.
         fdnet: version of fdnet, whose forces these are; "" by a version that did not record it.
     """
 
@@ -105,6 +106,7 @@ class Record(NamedTuple):
     dump: str
     restart: str
     updates: str
+    fluid: str = ""
     fdnet: str = ""
 
 
@@ -163,9 +165,10 @@ class Checkpoints:
         self.store(row.step, record)
 
     def remove_restarts(self, step: int) -> None:
-        """Remove the restarts before `step`, but for the two newest."""
-        for _, old in [one for one in self.files("restart") if one[0] <= step][:-2]:
-            old.unlink(missing_ok=True)
+        """Remove the restarts before `step`, but for the two newest, and what goes with them."""
+        for suffix in ("restart", "npz"):
+            for _, old in [one for one in self.files(suffix) if one[0] <= step][:-2]:
+                old.unlink(missing_ok=True)
 
     def _digests(self, step: int) -> dict[str, str]:
         """Digests of the files of a checkpoint. Raises OSError where one cannot be read."""
@@ -174,6 +177,8 @@ class Checkpoints:
         except (LiggghtsError, KeyError):
             updates = [{"unreadable": 0.0}]
         files = {name: file_digest(self.path(step, name)) for name in ("dump", "restart")}
+        memory = self.path(step, "npz")
+        files["fluid"] = file_digest(memory) if memory.exists() else ""
         return files | {"updates": rows_digest([sorted(row.items()) for row in updates])}
 
     def last(self) -> Any | None:

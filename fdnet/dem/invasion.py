@@ -213,6 +213,7 @@ class ChunkedStage(ABC):
         assert self.fluid is not None
         updates = Updates(self.folder, self.fluid.measured, upto=last.step if last else 0)
         step, pace = last.step if last else self.first_step, self.pace(last)
+        self.fluid.recall(self.points.path(step, "npz") if last else None)
         feed(f"include {name}")
         while last is None or not self.over(last):
             if self.pace(last) != pace:
@@ -223,6 +224,7 @@ class ChunkedStage(ABC):
                 steps = self._update(feed, updates, last, pace, end - step)
                 feed(f"run {steps}" + ("" if fresh else " pre no post no"))
                 step, fresh = step + steps, False
+            self.fluid.keep(self.points.path(step, "npz"))
             feed("include checkpoint.in")
             last = read_history(self.folder, self.points.kind)[-1]
 

@@ -138,7 +138,10 @@ def size_warnings(case: Case) -> Iterator[Doubt]:
                     "(size and passing, or a file) if it matters",
                 )
         curve = spheres.curve
-        ends = ((curve.below, "finer", curve.low), (curve.above, "coarser", curve.high))
+        below = curve.below
+        if isinstance(spheres, Fines) and isinstance(case, InvasionCase):
+            below *= not (case.with_classes or case.by_classes)
+        ends = ((below, "finer", curve.low), (curve.above, "coarser", curve.high))
         parts = [
             f"{100 * share:.3g} % of the solids ({side} than {1e6 * size:.3g} um)"
             for share, side, size in ends
