@@ -3,7 +3,7 @@
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib import metadata
@@ -22,11 +22,11 @@ from fdnet.statistics.differences import MOST_SEEDS
 if TYPE_CHECKING:
     import pandas as pd
 
-SHOWN = ("k_reduction", "damage.face_lost", "k_damaged_m2", "invasion_depth_p95_m")
-SHOWN += ("skin", "skin_flow_lost", "invaded_count", "passed_count")
+SHOWN = ["k_reduction", "damage.face_lost", "k_damaged_m2", "invasion_depth_p95_m"]
+SHOWN += ["skin", "skin_flow_lost", "invaded_count", "passed_count"]
 """Quantities of the tables of the page, after the ranked one."""
-LAYERS = ("porosity_initial", "porosity_damaged", "k_initial_m2", "k_damaged_m2", "k_reduction")
-LAYERS += ("fines_count",)
+LAYERS = ["porosity_initial", "porosity_damaged", "k_initial_m2", "k_damaged_m2", "k_reduction"]
+LAYERS += ["fines_count"]
 """Quantities of the tables by depth."""
 
 
@@ -290,21 +290,22 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5
 
 def _draw(comparison: Comparison) -> dict[str, dict[str, str]]:
     """The figures that have data, drawn into the folder of the page, by the stem of their file."""
-    drawn, several = {}, len(comparison.variants) > 1
+    shown, several = dict[str, dict[str, str]](), len(comparison.variants) > 1
+
+    def add(name: str, fill: Callable[..., None], caption: str) -> None:
+        path = figures.draw(comparison.path / f"{name}.svg", partial(fill, comparison=comparison))
+        shown[name] = html.shown_figure(path, caption)
+
     if several and comparison.numbers.get(comparison.ranked_by):
         caption = "Every run (grey), mean over the seeds (line) and its 95 % band (blue)."
-        drawn["ranking"] = (_fill_ranking, caption)
+        add("ranking", _fill_ranking, caption)
     if "sections.1.k_damaged_inplace_m2" in comparison.numbers:
         more = f", of {len(COLOURS)} variants at most" if several else "; thin lines are the runs"
         caption = (
             "Permeability in place of the slabs after the invasion, mean over the seeds with its "
             f"95 % band; dashed is the intact sand{more}."
         )
-        drawn["by_depth"] = (_fill_depth, caption)
-    shown = {}
-    for name, (fill, caption) in drawn.items():
-        path = figures.draw(comparison.path / f"{name}.svg", partial(fill, comparison=comparison))
-        shown[name] = html.shown_figure(path, caption)
+        add("by_depth", _fill_depth, caption)
     return shown
 
 
