@@ -372,7 +372,7 @@ def with_band(row: Mapping[str, Any], key: str) -> str:
     """The number of a row with its band; a share in percent."""
     share = key.endswith(("_over_k0", "_lost"))
     values = [row[key], row.get(f"{key}_low"), row.get(f"{key}_high")]
-    one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.2g}" for v in values)
+    one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.3g}" for v in values)
     unit = " %" if share else ""
     return f"{one}{unit}" if None in band else f"{one}{unit} ({band[0]} to {band[1]}{unit})"
 
