@@ -20,6 +20,7 @@ CHAPTERS: dict[str, str] = {
     "truth": "validation.truth_solved",
     "outside": "validation.outside",
     "mechanics": "validation.mechanics",
+    "scoreboard": "validation.scoreboard",
     "bridging": "validation.bridging",
     "thesis": "validation.thesis.command",
 }
