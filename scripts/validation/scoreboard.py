@@ -545,8 +545,8 @@ BEADS = {"plug": ((0.177, 0.210), 900.0), "plateau": ((0.250, 0.297), 450.0)}
 def beads(trial: Trial) -> Seen:
     """k/k0 of 20 grains of sand, and its first quarter's share of the deposit.
 
-    Glass beads of 5 to 10 um come in water by half a percent, at constant pressure, as size
-    classes on the network. The source of the row names no concentration to us.
+    Twenty pore volumes of water bring half a percent of beads of 5 to 10 um at constant pressure,
+    as size classes on the network. The concentration of the experiment is not known to us.
     """
     (low, high), gradient = BEADS[trial.value]
     length, side = 10 * (low + high), 2.5 * (low + high)
@@ -556,9 +556,14 @@ def beads(trial: Trial) -> Seen:
         "seed": trial.seed,
         "box": {"size_mm": [length, side, side], "sides": "periodic"},
         "grains": {"sizes": {**sieved, "size_mm": [low, high]}, "porosity": 0.38},
-        "fines": {"sizes": {**sieved, "size_mm": [0.005, 0.010]}, "concentration": 0.005},
+        "fines": {
+            "sizes": {**sieved, "size_mm": [0.005, 0.010]},
+            "concentration": 0.005,
+            "slab_mm": 20 * 0.38 * length,
+        },
         "fluid": {
             "viscosity_cP": 1.0,
+            "density_kg_m3": 998.0,
             "overbalance_MPa": 1e-6 * gradient * length,
             "darcy_length_mm": length,
         },
@@ -586,8 +591,8 @@ def judge_beads(rows: pd.DataFrame) -> list[Finding]:
             continue
         (left, band), (first, _) = own["k over k0"], own["first quarter"]
         seen = f"k/k₀ {left:.2f} ± {band:.2f}, {100 * first:.0f} % in the first quarter"
-        over = left / 0.05 if plug else max(0.2 / max(left, 1e-9), abs(first - 0.25) / 0.15)
-        lines.append(Finding(what, number, source, seen, over))
+        even = abs(first - 0.25) / 0.15 if 0.05 < left < 0.99 else math.inf
+        lines.append(Finding(what, number, source, seen, left / 0.05 if plug else even))
     return lines
 
 
