@@ -46,6 +46,7 @@ def test_the_case_of_a_sand_and_a_mud_is_sized_by_them(median, tmp_path, capsys)
     assert max(scales.impact_overlap, scales.drag_overlap) <= case.run.max_overlap
     said = capsys.readouterr().out
     assert (cost.seconds > 1.05 * 600) == ("longer than the 10 min" in said)
+    assert said.count("  cut = ") == 3 * ("longer than" in said)
     assert case.fines.endless
     assert case.fines.sizes.D10_mm == pytest.approx(5e-4 * median)
     assert case.well.radius_mm == 108.0
@@ -135,7 +136,7 @@ def test_one_bad_answer_is_asked_for_again_and_the_others_stay(tmp_path, monkeyp
     """One that cannot be read at once, one that makes no case when all are there."""
     replies = {
         "Sand, D50": ["0.40", "0.40 mm"],
-        "Porosity": ["38 %"],
+        "Porosity": ["", "38 %"],
         "Solids in the mud": ["45 %", "5 %"],
         "Viscosity": ["ten cP", "10 cP"],
     }
@@ -145,9 +146,14 @@ def test_one_bad_answer_is_asked_for_again_and_the_others_stay(tmp_path, monkeyp
     assert (case.grains.sizes.D50_mm, case.fluid.viscosity_cP) == (0.4, 10)
     assert case.fines.concentration == pytest.approx(0.05)
     assert not any(replies.values())
-    assert sum(prompt.startswith("Porosity") for prompt in asked) == 1
+    assert sum(prompt.startswith("Porosity") for prompt in asked) == 2
     said = capsys.readouterr().err
-    for text in ("--sand-d50: '0.40': has no unit", "--viscosity: 'ten cP'", "--solids: 0.45"):
+    for text in (
+        "it needs an answer, as",
+        "--sand-d50: '0.40': has no unit",
+        "--viscosity: 'ten cP'",
+        "--solids: 0.45",
+    ):
         assert text in said
 
 

@@ -52,7 +52,7 @@ def _init(options: argparse.Namespace) -> int:
     design = _designed(options, name, out)
     write_new(out, case_text(design), force=options.force)
     print(f"{out}: written, expected to take {spoken_time(design.seconds)} on one core")
-    for text in left_out(design):
+    for text in left_out(design, out.absolute().parent):
         print(f"  {text}")
     print(f"  fdnet check {out}    what is odd, time and memory")
     print(f"  fdnet run {out}      the answer, in runs/{name}/report.html")

@@ -26,6 +26,7 @@ from fdnet.dem.supply import Batches, batches_of
 from fdnet.errors import CaseError, Doubt, DumpError, LiggghtsError, explained
 from fdnet.files import write_text
 from fdnet.scales.clock import ARRIVALS, PRESSED, arrival_time, rises
+from fdnet.scales.contacts import two_digits_up
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.geometry import groups_apart, max_overlap
@@ -155,7 +156,7 @@ class Checkpoints:
             case=self.digest,
             ranks=ranks,
             row=csv_row(row),
-            overlap=_digest(overlaps),
+            overlap=rows_digest(overlaps),
             fdnet=fdnet_version(),
             **self._digests(row.step),
         )
@@ -173,7 +174,7 @@ class Checkpoints:
         except (LiggghtsError, KeyError):
             updates = [{"unreadable": 0.0}]
         files = {name: file_digest(self.path(step, name)) for name in ("dump", "restart")}
-        return files | {"updates": _digest([sorted(row.items()) for row in updates])}
+        return files | {"updates": rows_digest([sorted(row.items()) for row in updates])}
 
     def last(self) -> Any | None:
         """The newest checkpoint that is as it was recorded; None without one.
@@ -200,7 +201,7 @@ class Checkpoints:
         usable = []
         for row, overlaps in zip(rows, parts, strict=False):
             record = records.get(row.step)
-            if not record or (record.case, record.overlap) != (self.digest, _digest(overlaps)):
+            if not record or (record.case, record.overlap) != (self.digest, rows_digest(overlaps)):
                 break
             usable.append((row, record))
         return next((row for row, record in reversed(usable) if self._is_whole(row, record)), None)
@@ -304,7 +305,7 @@ def file_digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _digest(rows: Sequence[Any]) -> str:
+def rows_digest(rows: Sequence[Any]) -> str:
     """SHA-256 of some rows of numbers."""
     return hashlib.sha256("".join(f"{row!r}\n" for row in rows).encode()).hexdigest()
 
@@ -403,7 +404,7 @@ def quiet_enough(
     are no mud: they say nothing of the face.
     """
     waiting = row.upstream - row.removed_upstream
-    follows = case.drag.field == "network"
+    follows = case.drag.coupled
     mud = waiting >= ARRIVALS if follows else waiting > 0
     if row.quiet < (quiet_chunks(scales) if mud else empty_chunks(case, scales)):
         return False
@@ -672,11 +673,16 @@ def deepest_of(seen: Iterable[Deepest]) -> Deepest:
     return max(seen, key=lambda row: row.fraction, default=Deepest(0, 0.0))
 
 
-def overlap_text(case: Case, deepest: Deepest) -> str:
-    """The overlap and its limit, in words."""
+def overlap_text(case: Case, deepest: Deepest, stiffness: float) -> str:
+    """The overlap, its limit and what to do, in words; springs ended at a `stiffness` of N/m."""
+    stiffer = "raise run.stiffness_N_m"
+    if isinstance(case.run.stiffness_N_m, str):
+        power = 1.5 if case.contact.model == "hertz" else 1.0
+        enough = two_digits_up((deepest.fraction / PRESSED) ** power * stiffness)
+        stiffer = f"set run.stiffness_N_m = {enough:.2g}"
     return (
         f"a fine overlapped by {100 * deepest.fraction:.3g} % of the smaller diameter at step "
-        f"{deepest.step} (limit run.max_overlap, {100 * case.run.max_overlap:.3g} %)"
+        f"{deepest.step} (limit run.max_overlap, {100 * case.run.max_overlap:.3g} %): {stiffer}"
     )
 
 

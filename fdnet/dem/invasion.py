@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -321,11 +321,13 @@ class Invasion(EndedStage):
 
     Attributes:
         supplied: number of fines that took part: all, or those of the batches that had come.
+        last: the scales of the last chunk: its step and its springs.
         overlap: largest overlap of a fine with any sphere.
         updates: the record of a coupled invasion, one row an update; empty when it is not coupled.
     """
 
     supplied: int
+    last: InvasionScales
     overlap: Deepest
     updates: tuple[Mapping[str, float], ...]
 
@@ -408,10 +410,10 @@ class InvadeStage(ChunkedStage):
         deepest = deepest_of([*overlaps, *(overlap_in(case, state) for _, state in states)])
         if deepest.fraction > case.run.max_overlap:
             raise LiggghtsError(
-                f"{self.folder}: {overlap_text(case, deepest)}; stopped at checkpoint "
-                f"{history[-1].chunk} (step {history[-1].step}) because of run.on_overlap = "
-                "'stop'; raise run.stiffness_N_m and start over with --force, or go on from here "
-                "with --resume --set run.on_overlap=warn (or a larger run.max_overlap)"
+                f"{self.folder}: {overlap_text(case, deepest, self.pace(history[-1]).stiffness)}, "
+                f"and start over with --force; stopped at checkpoint {history[-1].chunk} (step "
+                f"{history[-1].step}) because of run.on_overlap = 'stop'; go on from here with "
+                "--resume --set run.on_overlap=warn (or a larger run.max_overlap)"
             )
 
     def begin_chunk(self, feed: Feed, updates: Updates, last: Checkpoint | None) -> None:
@@ -518,8 +520,8 @@ def invade(
     deck, runs = stage.drive()
     history = read_history(folder)
     reason, warnings = stage.ending(history)
-    made = (warnings + points.doubts(), deck.left_out, runs, launch.ranks)
-    return _read(case, scales, grains, folder, history, reason, *made)
+    ended = _Ended(reason, warnings + points.doubts(), launch.ranks, deck.left_out, runs)
+    return _read(case, scales, grains, folder, history, ended)
 
 
 def invasion_so_far(
@@ -535,8 +537,18 @@ def invasion_so_far(
     if last is None or record is None:
         return None
     history = tuple(row for row in read_history(folder) if row.step <= last.step)
-    made = (points.doubts(), (), (), record.ranks)
-    return _read(case, scales, grains, folder, history, "unfinished", *made)
+    ended = _Ended("unfinished", points.doubts(), record.ranks)
+    return _read(case, scales, grains, folder, history, ended)
+
+
+class _Ended(NamedTuple):
+    """How an invasion ended; the fields are those of `EndedStage`."""
+
+    stop_reason: str
+    warnings: list[str]
+    ranks: int
+    left_out: tuple[LeftOut, ...] = ()
+    runs: tuple[Execution, ...] = ()
 
 
 def _read(
@@ -545,11 +557,7 @@ def _read(
     grains: Snapshot,
     folder: Path,
     history: tuple[Checkpoint, ...],
-    reason: str,
-    warnings: list[str],
-    left_out: tuple[LeftOut, ...],
-    runs: tuple[Execution, ...],
-    ranks: int,
+    ended: _Ended,
 ) -> Invasion:
     """The invasion whose files are in `folder`, up to the last checkpoint of the `history`."""
     batches, step = batches_of(case, scales), history[-1].step
@@ -557,23 +565,21 @@ def _read(
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
     if len(overlaps) < len(history):
-        warnings.append(
+        ended.warnings.append(
             Doubt(
                 "dumps-cannot-be-read",
                 f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be "
                 "read: they are missing from the largest overlap and from invasion.pvd",
             )
         )
+    begun = history[-2].step if len(history) > 1 else 0
     return Invasion(
+        **ended._asdict() | {"warnings": tuple(ended.warnings)},
         state=damaged,
         history=history,
-        stop_reason=reason,
+        last=stiffened(case, scales, step - begun),
         supplied=batches.supplied(entered_by(case, batches, history[-1])),
         overlap=deepest_of([*overlaps, *(one for one in read_watch(folder) if one.step <= step)]),
         step_s=scales.time_step,
-        left_out=left_out,
-        warnings=tuple(warnings),
-        ranks=ranks,
-        runs=runs,
         updates=tuple(row for row in read_updates(folder) if row["step"] < step),
     )

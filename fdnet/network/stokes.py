@@ -13,8 +13,6 @@ from math import ceil, floor, sqrt
 
 import numpy as np
 from scipy import fft
-from scipy.linalg import eigh_tridiagonal
-from scipy.ndimage import gaussian_filter
 
 from fdnet.errors import CaseError, FlowError, NetworkError
 from fdnet.network.compiled import compiled, loops_in_place
@@ -149,15 +147,10 @@ class Response:
         if not self.wrapping:  # all transforms are real then
             self.difference = [one.real.copy() for one in self.difference]
 
-    def velocity(self, force: list[Array], kept: Array | None = None) -> list[Array]:
-        """Velocity, three arrays of nodes with mean 0, of such forces.
-
-        Each wave is multiplied by what is `kept` of it, where that is given.
-        """
+    def velocity(self, force: list[Array]) -> list[Array]:
+        """Velocity, three arrays of nodes with mean 0, of such forces."""
         waves = [self._forward(part, d) for d, part in enumerate(force)]
         _respond(*waves, *self.difference, False)
-        if kept is not None:
-            waves = [wave * kept for wave in waves]
         return [self._back(wave, d) for d, wave in enumerate(waves)]
 
     def pressure(self, force: list[Array]) -> Array:
@@ -381,12 +374,7 @@ def _mark(
 
 
 # ------------------------------------------------------------------------------------------------
-# The preconditioner of the wall forces: G - share G Z F Z' G
-# (docs/theory/resolved_flow.md, 5). G are the seven-point differences of the forces at the wall
-# nodes, Z spreads three smooth fields on these nodes, and F = exp(-|q|2 reach2) for the wave
-# number q is the low-pass filter of fields without divergence. Z is scaled by the smoothed density
-# of the walls, so that Z' G Z is about 1. The fields live on cells of half the reach, where all
-# this costs little.
+# The preconditioner G of the wall forces, and sums (docs/theory/resolved_flow.md, 5).
 
 
 OWN_RESPONSE = 2.0 / 3.0 * 0.252731
@@ -396,133 +384,6 @@ It is 2/3 of the lattice Green's function at 0 (Watson 1939). It only scales the
 """
 DIFFERENCES = 10.0
 """Weight of the differences in the preconditioner over that of the forces themselves."""
-TAKEN_OUT = 0.99
-"""Share that is taken out of the force that the differences weigh most."""
-ALIKE = 1.2
-"""Length within which forces are alike, over the mean radius of the grains."""
-PROBED = 12
-"""Steps of the process of Lanczos for the greatest eigenvalue. In the pack of specimen 5 they give
-it to 0.1 %, so the whole stays positive definite."""
-
-Blocks = tuple[Array, Array, Array]
-"""The coarse cell (n,) of each node along x, y and z."""
-
-
-class Collective:
-    """The slowly varying forces on wall nodes, on arrays (3, n0, n1, n2).
-
-    Args:
-        weight: of the nodes, 0 where there is no wall.
-        response: of the grid.
-        differences: G, from forces to forces.
-        radius: mean radius of the grains, in cells along x.
-    """
-
-    def __init__(
-        self,
-        weight: Array,
-        response: Response,
-        differences: Callable[[Array], Array],
-        radius: float,
-    ) -> None:
-        fine, reach = np.array(response.shape), ALIKE * radius
-        scale = response.scale
-        coarse = np.round(fine / scale / (0.5 * reach)).astype(int)
-        coarse = np.clip(coarse, np.minimum(FEWEST_CELLS, fine), fine)
-        self.weight, self.differences = weight, differences
-        nodes = zip(response.nodes, fine, coarse, strict=True)
-        x, y, z = (np.arange(count) * m // n for count, n, m in nodes)
-        self.blocks: Blocks = (x, y, z)
-        shape = (int(coarse[0]), int(coarse[1]), int(coarse[2]))
-        self.response = Response(
-            shape, response.walled, scale * coarse / fine, planes=response.planes
-        )
-        squares = (np.abs(one) ** 2 for one in self.response.difference)
-        wave = np.asarray(sum(np.meshgrid(*squares, indexing="ij")), np.float32)
-        self.kept = wave * np.exp(-(reach**2) * wave)
-        self.scale = self._scales(reach * self.response.scale)
-        self.share = TAKEN_OUT / self.greatest()
-
-    def reduced(self, force: Array) -> Array:
-        """The `force` less what is taken out of it: `force` - share Z F Z' G `force`."""
-        fields = self.scale * self._smooth(self.scale * self._gathered(self.differences(force)))
-        spread = self._spread(self.share * fields)
-        return np.subtract(force, spread, out=spread)
-
-    def _spread(self, fields: Array) -> Array:
-        """Weight times the field of each node's block."""
-        spread = fields.astype(np.float32)
-        for axis in (3, 2, 1):
-            spread = spread.repeat(np.bincount(self.blocks[axis - 1]), axis)
-        spread *= self.weight
-        return spread
-
-    def _smooth(self, fields: Array) -> Array:
-        """F times the `fields`."""
-        return np.stack(self.response.velocity(list(fields.astype(np.float32)), self.kept))
-
-    def _gathered(self, force: Array) -> Array:
-        """Sums (3, m0, m1, m2) of weight times `force` over the nodes of each block."""
-        total = np.zeros((3, *self.response.nodes))
-        _gather(force, self.weight, self.blocks, np.empty(force.shape[3]), total)
-        return total
-
-    def _scales(self, width: Array) -> Array:
-        """One over the root of the smoothed density of the walls, for three components."""
-        own = self._gathered(self.differences(self.weight))
-        modes = ["reflect" if walled else "wrap" for walled in self.response.walled]
-        modes[0] = "reflect" if self.response.planes else "wrap"
-        parts = []
-        for density in own:
-            some = (density > 0).astype(float)
-            smooth, area = (
-                gaussian_filter(one, np.sqrt(2.0) * width, mode=modes) for one in (density, some)
-            )
-            mean = np.divide(smooth, area, out=np.zeros_like(smooth), where=density > 0)
-            parts.append(np.divide(1.0, np.sqrt(mean), out=mean, where=mean > 0))
-        return np.stack(parts)
-
-    def greatest(self) -> float:
-        """The greatest eigenvalue of F Z' G Z, by the process of Lanczos (1950).
-
-        With E = Z' G Z, F E is symmetric in the product x' E y.
-        """
-        field = np.asarray(np.random.default_rng(0).standard_normal(self.scale.shape))
-        former = np.zeros_like(field)
-        diagonal: list[float] = []
-        beside: list[float] = []
-        for _ in range(PROBED):
-            forces = self._spread(self.scale * field)
-            weighed = np.asarray(self.scale * self._gathered(self.differences(forces)))
-            size = float(np.sqrt(max(float(np.vdot(field, weighed)), 0.0)))
-            if not size > 0.0:
-                break
-            field, weighed = field / size, weighed / size
-            moved = self._smooth(weighed)
-            beside.append(size)
-            diagonal.append(float(np.vdot(moved, weighed)))
-            former, field = field, moved - diagonal[-1] * field - size * former
-        if not max(diagonal, default=0.0) > 0.0:
-            return 1.0
-        return float(eigh_tridiagonal(diagonal, beside[1:], eigvals_only=True)[-1])
-
-
-@loops_in_place
-def _gather(force: Array, weight: Array, blocks: Blocks, row: Array, total: Array) -> None:
-    """Adds weight times `force` to the `total` (3, m0, m1, m2); `row` is room for n2 numbers."""
-    x, y, z = blocks
-    for d in range(3):
-        for i in range(len(x)):
-            for j in range(len(y)):
-                if j == 0 or y[j] != y[j - 1]:
-                    row[:] = 0.0
-                one, own = force[d, i, j], weight[d, i, j]
-                for k in range(len(z)):
-                    row[k] += np.float64(own[k] * one[k])
-                if j + 1 == len(y) or y[j + 1] != y[j]:
-                    into = total[d, x[i], y[j]]
-                    for k in range(len(z)):
-                        into[z[k]] += row[k]
 
 
 def neighbour_differences(value: Array, weight: Array, share: float) -> Array:
@@ -561,18 +422,8 @@ def _differ(value: Array, weight: Array, share: float, result: Array) -> None:
 
 
 def summed_product(one: Array, other: Array) -> float:
-    """Sum in double precision of the products of two arrays of one shape (..., n)."""
-    columns = np.zeros(one.shape[-1])
-    _add_products(one.reshape(-1, len(columns)), other.reshape(-1, len(columns)), columns)
-    return float(columns.sum())
-
-
-@loops_in_place
-def _add_products(one: Array, other: Array, columns: Array) -> None:
-    for row in range(one.shape[0]):
-        a, b = one[row], other[row]
-        for k in range(len(columns)):
-            columns[k] += np.float64(a[k]) * np.float64(b[k])
+    """Sum of the products of two arrays of one shape (..., n); rows add up in double precision."""
+    return float(np.einsum("...k,...k->...", one, other).sum(dtype=np.float64))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -595,13 +446,10 @@ class Problem:
     Args:
         walls: of the three velocity components.
         response: S.
-        radius: mean radius of the grains, in cells along x.
         sideways: whether the fluid may drift along periodic sides.
     """
 
-    def __init__(
-        self, walls: list[Walls], response: Response, radius: float, *, sideways: bool = True
-    ) -> None:
+    def __init__(self, walls: list[Walls], response: Response, *, sideways: bool) -> None:
         self.walls, self.response = walls, response
         self.weight, self.own = (np.zeros((3, *response.nodes), np.float32) for _ in range(2))
         for wall, weight, own in zip(walls, self.weight, self.own, strict=True):
@@ -616,7 +464,6 @@ class Problem:
         elif sideways:
             self.drifting = [d for d in (1, 2) if not response.walled[d]]
         self.norms = [summed_product(part, part) for part in (self.right[0], *self.weight[1:])]
-        self.collective = Collective(self.weight, response, self.differences, radius)
 
     def apply(self, scaled: Array, room: Array) -> Array:
         """A times `scaled`, in an array `room` of its shape."""
@@ -627,13 +474,9 @@ class Problem:
             moved += flow
         return room
 
-    def differences(self, value: Array) -> Array:
-        """G times a `value`."""
-        return neighbour_differences(value, self.weight, DIFFERENCES / 6.0)
-
     def smoothed(self, residual: Array) -> Array:
-        """The preconditioner times a `residual`, projected."""
-        return self.project(self.differences(self.collective.reduced(residual)))
+        """The preconditioner G times a `residual`, projected."""
+        return self.project(neighbour_differences(residual, self.weight, DIFFERENCES / 6.0))
 
     def project(self, scaled: Array) -> Array:
         """`scaled` without the part that carries a net force sideways, changed in place."""
@@ -714,7 +557,6 @@ def solve(
     position: Array,
     radius: Array,
     *,
-    grain: float,
     slip: float,
     change: float | None = None,
     sideways: bool = True,
@@ -725,7 +567,6 @@ def solve(
         lattice: the grid.
         position: (N, 3) m, centres of the spheres.
         radius: (N,) m.
-        grain: m, mean radius of the grains, which only serves to solve faster.
         slip: rms velocity over the superficial one that may be left at the walls.
         change: share by which k may still have fallen over the last quarter of the iterations, at
             least 10, where that counts too.
@@ -741,7 +582,7 @@ def solve(
             f"resolved flow: no wall on the grid of {lattice.shape} cells, expected spheres "
             "in the box; add some or refine the grid"
         )
-    problem = Problem(walls, lattice.response, grain / lattice.unit, sideways=sideways)
+    problem = Problem(walls, lattice.response, sideways=sideways)
     resistance = [0.0]
     for iterations, (left, gained) in enumerate(problem.steps()):
         resistance.append(resistance[-1] + gained)
@@ -901,13 +742,11 @@ def _reference(
         repeats=True,
         planes=planes,
     )
-    grains = spheres.grains().radius if len(spheres.grains()) else spheres.radius
     try:
         flow = solve(
             lattice,
             position,
             spheres.radius,
-            grain=float(grains.mean()) if len(grains) else float(edges.max()),
             slip=LARGEST_SLIP,
             change=tolerance,
             sideways=sideways,

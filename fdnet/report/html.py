@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -137,6 +136,42 @@ def _folded(title: str, content: str) -> str:
 
 
 # ------------------------------------------------------------------------------------------------
+# The section of the report on a core and a well; a report without it has none.
+
+
+FORMATION = "formation"
+
+
+class _ScaledUp(JsonObject):
+    """What core.json and well.json say in words."""
+
+    words: list[str]
+    warnings: list[str]
+
+
+def formation_html(folder: Path) -> str:
+    """The section as HTML from the files in the folder `formation`; "" where nothing was asked.
+
+    Raises CaseError where a file cannot be understood.
+    """
+    parts, notes, advice = list[str](), list[str](), "call fdnet core or fdnet well again"
+    for name, noun in (("well", "A well"), ("core", "A core")):
+        if (path := folder / f"{name}.json").is_file():
+            found = read_json(path, _ScaledUp, noun=f"result of fdnet {name}", advice=advice)
+            said = "</p><p>".join(map(words, found["words"]))
+            parts.append(f"<h3>{noun}</h3><p>{said}</p>")
+            notes += found["warnings"]
+    figure = folder / "handed_up.svg"
+    if figure.is_file():
+        parts.append(
+            f'<figure><img src="{_data_uri(figure)}" alt="fit over the profile"></figure>'
+        )
+    items = "".join(f"<li>{words(text)}</li>" for text in dict.fromkeys(notes))
+    parts += [f'<div class="warnings"><ul>{items}</ul></div>'] if items else []
+    return _folded("From the face to a core and a well", "\n".join(parts)) if parts else ""
+
+
+# ------------------------------------------------------------------------------------------------
 # The section of the report on resolved Stokes flow; a report without it has none.
 
 
@@ -226,6 +261,7 @@ class ReportParts:
         tables: further tables (`fdnet.report.figures.PageTable`), in order.
         stokes: the section on resolved Stokes flow, as HTML.
         mechanics: the section on the mechanics of the pack, as HTML.
+        formation: the section on a core and a well, as HTML.
     """
 
     figures: Sequence[tuple[Path, str]] = ()
@@ -237,6 +273,7 @@ class ReportParts:
     tables: Sequence[Any] = ()
     stokes: str = ""
     mechanics: str = ""
+    formation: str = ""
 
 
 def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:
@@ -247,29 +284,41 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
 
     Raises CaseError for a figure that cannot be read.
     """
-    from jinja2 import Environment, StrictUndefined
-
-    page = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    for one in (quantity, in_millidarcy, percent, multiplied, words):
-        page.filters[one.__name__] = one
-    page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
-    page.globals.update(shows=SHOWS, agrees=AGREES, columns=SECTION_COLUMNS)
-    figures = [
-        {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
-        for file, caption in parts.figures
-    ]
-    template = resources.files("fdnet.report").joinpath("report.html.j2").read_text("utf-8")
-    text = page.from_string(template).render(
+    figures = [shown_figure(Path(file), caption) for file, caption in parts.figures]
+    text = page_text(
+        "report/report.html.j2",
         summary=summary,
         parts=parts,
+        columns=SECTION_COLUMNS,
         figures=[one for one in figures if one["name"] not in (STILL, LEADING)],
         leading=[one for one in figures if one["name"] == LEADING],
         still=[one for one in figures if one["name"] == STILL],
         headline=list(facts(summary)) if "supplied_count" in summary else [],
     )
     return write_text(path, text)
+
+
+def page_text(template: str, **shown: Any) -> str:
+    """A page from its template, a path within fdnet; the style is that of page.html.j2."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    page = Environment(
+        loader=PackageLoader("fdnet", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    for one in (quantity, in_millidarcy, percent, multiplied, words):
+        page.filters[one.__name__] = one
+    page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
+    page.globals.update(shows=SHOWS, agrees=AGREES)
+    return page.get_template(template).render(**shown)
+
+
+def shown_figure(path: Path, caption: str) -> dict[str, str]:
+    """A figure as the macro `show` takes it. Raises CaseError where it cannot be read."""
+    return {"data": _data_uri(path), "caption": caption, "name": path.name}
 
 
 def quantity(value: Any, unit: str = "") -> str:

@@ -139,13 +139,21 @@ def in_place_words(counts: Mapping[str, int]) -> str:
     )
 
 
+CAKE_LAWS = {
+    "beetstra": "by Beetstra's law of drag",
+    "carman-kozeny": "by Carman and Kozeny of the classes in it",
+    "given": "as the case gives it",
+}
+"""Where the permeability of a cake is from, by the name in the summary."""
+
+
 def cake_words(summary: Mapping[str, Any]) -> str:
     """How the cake lets the fluid through; `summary` has the keys of `cake_summary`."""
     cake, share = summary["cake"], percent(summary["cake_resistance_share"])
     if cake is None:
         return "no cake yet: no fine stands before the face"
     own = cake["no_cake_yet"] or (
-        f"{in_millidarcy(cake['k_m2'])} mD by Beetstra's law of drag at a porosity of "
+        f"{in_millidarcy(cake['k_m2'])} mD {CAKE_LAWS[cake['law']]} at a porosity of "
         f"{cake['porosity']:.2f}"
     )
     return f"{cake['fines']} fines, {own}; {share} % of the resistance of cake and specimen"
@@ -301,9 +309,9 @@ def facts(summary: Mapping[str, Any]) -> Iterator[Fact]:
         )
     if flow is not None:
         yield Fact(
-            "flow",
+            "k of the flow",
             f"{percent(1 - flow)} % lost",
-            f"as the flow met it last: {FLOW_LAW} (k_over_k0 of history.csv)",
+            f"as the simulated flow met it last: {FLOW_LAW} (k_over_k0 of history.csv)",
         )
     porosity = f"{summary['porosity_initial']:.4f}"
     yield Fact(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.names import ALL_SPHERES
+from fdnet.names import ALL_SPHERES, SIZE_CLASSES
 from fdnet.report.text import answer_sentence, cake_words, certainty, end_words, in_place_words
 from fdnet.run.bridging import OpenThroats, open_throats, width_rows
 from fdnet.spheres.snapshot import Snapshot
@@ -76,7 +76,7 @@ def steps_of(analysis: "Analysis") -> list[Step]:
         Step(s.x_lo, s.x_hi, s.k_initial_inplace, s.k_damaged_inplace) for s in analysis.sections
     ]
     layers = analysis.layers
-    if layers is None or analysis.damage_law_used != ALL_SPHERES:
+    if layers is None or analysis.damage_law_used not in (ALL_SPHERES, SIZE_CLASSES):
         return whole
     edges = layers.edges
     columns = (edges[:-1], edges[1:], layers.k_initial, layers.k_damaged)

@@ -1,8 +1,8 @@
 """What a run writes next to its summary: tables, figures, ParaView files."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import accumulate
 from pathlib import Path
@@ -56,6 +56,7 @@ class Results:
         sizes: of grains and fines with measured curves.
         cleaned: what the clean-up gave; None without one.
         added: results that only some runs have.
+        numbers: of the summary, that only the fast model has.
     """
 
     path: Path
@@ -65,6 +66,7 @@ class Results:
     sizes: tuple[PlacedSizes, ...] = ()
     cleaned: Returned | None = None
     added: tuple[Added, ...] = ()
+    numbers: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def shown(self) -> Snapshot:
@@ -75,7 +77,9 @@ class Results:
     def history_rows(self) -> list[dict[str, float]]:
         """The rows of history.csv; none without an invasion."""
         one = self.invasion
-        return [] if one is None else history_rows(one.case, one.scales, one.history, one.updates)
+        if one is None or one.rows:
+            return [] if one is None else list(one.rows)
+        return history_rows(one.case, one.scales, one.history, one.updates)
 
 
 def write_tables(results: Results) -> None:
@@ -114,7 +118,7 @@ def write_paraview(results: Results) -> list[str]:
     vtk.write_pvd(
         path / "spheres.pvd", [(0.0, "spheres_initial.vtp"), (shown.time_s, "spheres_damaged.vtp")]
     )
-    if one is not None:
+    if one is not None and not one.rows:
         (path / "frames").mkdir(exist_ok=True)
         stride, entries = -(-len(one.history) // MOST_FRAMES), []
         chosen = one.history[::-1][::stride][::-1]
@@ -247,10 +251,12 @@ _CAKE_COLUMNS = (
 def with_added(results: Results, record: dict[str, Any] | None) -> Results:
     """The results with what only some runs have; `record` is that of the clean-up, if any."""
     one, added = results.invasion, []
-    if one is not None:
+    if one is not None and one.rows:
+        added = [*_filtrate(one)]
+    elif one is not None:
         added = [_cake(results, one), *_filtrate(one)]
-        if results.analysis.invaded_count:
-            added.append(_bridging(results, one))
+    if one is not None and results.analysis.invaded_count:
+        added.append(_bridging(results, one))
     if results.cleaned is not None and record is not None:
         added.append(_clean_up(results, results.cleaned, record))
     return replace(results, added=tuple(added))
@@ -284,12 +290,13 @@ def _cake(results: Results, one: FinishedInvasion) -> Added:
 
 def _filtrate(one: FinishedInvasion) -> Iterator[Added]:
     """Filtrate against the root of time, where the flow follows the deposit."""
-    if not one.updates or "filtrate_m3" not in one.updates[-1]:
+    updates, pace = one.rows or one.updates, 1.0 if one.rows else one.scales.force_factor
+    if not updates or "filtrate_m3" not in updates[-1]:
         return
     area = one.case.size_m[1] * one.case.size_m[2]
-    time = one.scales.force_factor * np.array([row["time_s"] for row in one.updates])
-    volume = np.array([row["filtrate_m3"] for row in one.updates]) / area
-    fit = fit_filtration(time, volume, cake_share(one.updates) or 0.0)
+    time = pace * np.array([row["time_s"] for row in updates])
+    volume = np.array([row["filtrate_m3"] for row in updates]) / area
+    fit = fit_filtration(time, volume, cake_share(updates) or 0.0)
     if fit is None:
         return
     usable = not fit.unsupported

@@ -21,6 +21,7 @@ from fdnet.network.warm_up import compiling
 from fdnet.report import html, tables
 from fdnet.report.text import case_words, thesis_law_warning
 from fdnet.run.answer import with_answer
+from fdnet.run.by_classes import analysed_classes, class_summary, finished_classes
 from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
 from fdnet.run.dem_stages import (
     file_warnings,
@@ -35,8 +36,10 @@ from fdnet.run.folder import (
     MESHES,
     RECORDS,
     SOME_TABLES,
+    START_OVER,
     TABLES,
     RunFolder,
+    check_files,
     check_finished,
     digests_of,
     frames_in,
@@ -65,7 +68,13 @@ from fdnet.run.summary import summarise
 from fdnet.scales.check import every_finding
 from fdnet.scales.cost import over_limit
 from fdnet.scales.pack import grain_count, refuse_unreachable
-from fdnet.scales.scales import InvasionScales, Scales, back_flow, scales_of
+from fdnet.scales.scales import (
+    InvasionScales,
+    Scales,
+    back_flow,
+    invasion_scales,
+    scales_of,
+)
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Directions, Snapshot
 
@@ -101,7 +110,9 @@ def run_case(
         progress: whether to show the progress on the terminal.
 
     Returns:
-        The finished run, as `open_run` gives it; lengths in m, permeabilities in m2.
+        The finished run, as `open_run` gives it; lengths in m, permeabilities in m2. With `resume`
+        and without the stage "invade", an invasion that was cut is analysed as far as it is: the
+        `stop_reason` of this provisional run is "unfinished".
 
     Raises:
         CaseError: the case, `out` or `stages` cannot be used.
@@ -131,8 +142,10 @@ def run_case(
         show_progress=progress,
         command="fdnet.run_case",
     )
-    run_stages(given, options)
-    return open_run(options.out)
+    if run_stages(given, options).get("stop_reason") != "unfinished":
+        return open_run(options.out)
+    files = digests_of(options.out, [*TABLES, *SOME_TABLES, *MESHES])
+    return FinishedRun(path=options.out, case=given, manifest={"files": files, "invade": {}})
 
 
 def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
@@ -207,12 +220,15 @@ def refusals(
             "grains.count or enlarge the box"
         )
     yield from _refused(refuse_unreachable, case)
-    if text := over_limit(case, scales, pack="pack" in needed, invade="invade" in needed):
+    spheres = not (isinstance(case, InvasionCase) and case.by_classes)
+    if text := over_limit(
+        case, scales, pack="pack" in needed, invade="invade" in needed and spheres
+    ):
         yield text
     if isinstance(case, InvasionCase) and isinstance(scales, InvasionScales):
         if "clean_up" in case.stages:
             yield from _refused(back_flow, case)
-        if "invade" in needed and supply:
+        if "invade" in needed and supply and spheres:
             yield from _refused(refuse_crowded_supply, case, scales)
 
 
@@ -315,6 +331,8 @@ def _analysed(session: Session, record: dict[str, Any] | None, *, returns: bool)
 
     case, grains = session.case, packed_grains(session)
     invasion = None
+    if record is not None and isinstance(case, InvasionCase) and case.by_classes:
+        return _analysed_classes(session, case, grains, record)
     if record is not None and isinstance(case, InvasionCase):
         invasion = invaded(session, case, grains, record)
     damaged = None if invasion is None else invasion.damaged
@@ -332,6 +350,26 @@ def _analysed(session: Session, record: dict[str, Any] | None, *, returns: bool)
         analysis=first,
         sizes=tuple(placed_sizes(case, grains, damaged, record["supplied"] if record else 0)),
         cleaned=after,
+    )
+
+
+def _analysed_classes(
+    session: Session, case: InvasionCase, grains: Snapshot, record: dict[str, Any]
+) -> Results:
+    """The specimen after the fast model."""
+    from fdnet.network.permeability import analyse
+
+    folder = session.path / "invade"
+    check_files(folder, record, START_OVER)
+    done, model, kept = finished_classes(case, invasion_scales(case), grains, folder)
+    clean = analyse(grains, periodic=case.periodic, options=case.analysis)
+    return Results(
+        path=session.path,
+        grains=grains,
+        invasion=done,
+        analysis=analysed_classes(model, kept, clean, done.damaged),
+        sizes=tuple(placed_sizes(case, grains, None, 0)),
+        numbers=class_summary(case, model, kept),
     )
 
 
@@ -378,6 +416,7 @@ def _summary(
             *file_warnings(session),
         ],
     )
+    summary |= results.numbers
     for one in results.added:
         summary |= one.summary
     return with_answer(summary, case, results.analysis, results.shown)
@@ -401,5 +440,6 @@ def _write_page(
         tables=[one.page for one in results.added if one.page is not None],
         stokes=report_section(session.path, case, summary),
         mechanics=html.mechanics_html(session.path / "mechanics"),
+        formation=html.formation_html(session.path / "formation"),
     )
     html.write_report(session.path / "report.html", summary, parts=parts)

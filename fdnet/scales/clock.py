@@ -384,7 +384,7 @@ def drive_in(case: InvasionCase, velocity: Velocity) -> Drive:
     own = push_of(case, velocity.interstitial, velocity.pressure_gradient)
     free = own.velocity + own.drift(case.fines.radius_range_m[1])
     time = relaxation_times(case)[1]
-    if case.drag.field == "network":
+    if case.drag.coupled:
         mud = 1 - case.fines.placed_fraction
         time /= float(crowd_drag_factor(Crowd(porosity=mud))) / mud
     return drive_of(case, own.velocity, time, free)
@@ -436,7 +436,7 @@ def deposit_pressure(case: InvasionCase, flow: Velocity, porosity: float) -> flo
 def rises(case: Case) -> bool:
     """Whether the springs of an invasion are stiffened when the deposit asks for it."""
     auto = case.run.stiffness_N_m == "auto" and case.run.time_step_s is None
-    return isinstance(case, InvasionCase) and case.drag.field == "network" and auto
+    return isinstance(case, InvasionCase) and case.drag.coupled and auto
 
 
 def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
@@ -468,7 +468,7 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
     deep = overlaps_of(soft, contact, flow, drive_in(soft, flow), porosity, borne)
     held, struck = (1.5, 2.5) if soft.contact.model == "hertz" else (1.0, 2.0)
     raised = max(
-        0.0 if soft.drag.field == "network" else 1.0,
+        0.0 if soft.drag.coupled else 1.0,
         (deep.drag / PRESSED) ** held,
         (deep.deposit / PRESSED) ** held * (STARTING if start and rises(case) else 1.0),
         (deep.impact / PRESSED) ** struck,

@@ -115,7 +115,7 @@ def expected_duration(case: InvasionCase, scales: InvasionScales) -> float:
     if scales.throat_ratio < BRIDGING:
         share = 1.0
         feeding += case.size_m[0] / scales.drive_velocity
-    slower = 1 / FALLING_RATE if case.drag.field == "network" else 1.0
+    slower = 1 / FALLING_RATE if case.drag.coupled else 1.0
     trickle = 0.0 if case.run.plug_rate > 0 else TRICKLING
     watched = max(WAITING * scales.plug_time, trickle * case.size_m[0] / scales.drive_velocity)
     return min(scales.cap_time, slower * feeding * min(1.0, share) + watched)
@@ -165,8 +165,7 @@ def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = 
     elif scales.time_step < 0.999 * sound:
         reason, remedy = "a tenth of the drag relaxation time", "take drag.scheme = 'implicit'"
     else:
-        stiffness = max(contact.normal_stiffness for contact in scales.contacts.values())
-        reason = f"set by contacts of {stiffness:.3g} N/m"
+        reason = f"set by contacts of {scales.stiffness:.3g} N/m"
         remedy = "lower run.stiffness_N_m (the time goes with its square root)"
     return (
         f"{refusal}: {cost.steps:.3g} steps of {scales.time_step:.3g} s ({reason}) with "

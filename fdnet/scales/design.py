@@ -9,6 +9,7 @@ import math
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -56,6 +57,8 @@ def filled(given: Answers, ask: Callable[[Question, str], str | None] | None) ->
                 ask = None
                 break
             text, problem = question.read(reply or question.default or "")
+            if not text and question.default is None:
+                problem = f"it needs an answer, as {question.example}"
             if not reply and question.default is not None:
                 break
         answers[question.key] = text or question.default or ""
@@ -220,6 +223,8 @@ FINEST_OF_THROAT = 1 / 7
 """Fines below this part of the throats pass (Barkman and Davidson 1972, J. Pet. Tech. 24)."""
 GAP = 0.95
 """Largest fine over smallest grain."""
+HIGHER_CUTS = (1.5, 2.0, 3.0)
+"""Diameters over the cut, for which the time is said where a case takes too long."""
 MOST_COARSE = 0.35
 """Share of the coarsest solids that may be left out."""
 USUAL_SIZES = {"sand_d10": "0.3 mm", "sand_d50": "0.5 mm", "sand_d90": "0.7 mm"}
@@ -272,17 +277,17 @@ def designed(
             why = str(error)
         if not why:
             return design
-    raise CaseError(_no_specimen(why, solids, choices[0]))
+    raise CaseError(_no_specimen(why, solids, choices[0], budget))
 
 
-def _no_specimen(why: str, solids: SizeCurve, first: Choice) -> str:
+def _no_specimen(why: str, solids: SizeCurve, first: Choice, budget: Budget) -> str:
     """That no choice makes a case that is run, with the reason and the options to change."""
     reason = re.split(r"; |: (?=take|lower|raise)", _spoken(why))[0]
     if reason.startswith("--"):
         return f"{reason}: change it"
     key, _, words = reason.partition(": ")
     subject = {"run.max_hours": "at most ", "run.time_step_s": "a time step of "}.get(key, "")
-    passing = ""
+    passing, smaller = "", "" if budget.name == "quick" else "--size quick, "
     if _kept_above(solids, first.passing) < LEAST_KEPT * solids.kept:
         passing = (
             f" (most of the solids, {um(solids.low)} to {um(solids.high)}, are finer than a "
@@ -290,9 +295,9 @@ def _no_specimen(why: str, solids: SizeCurve, first: Choice) -> str:
         )
     return (
         "no specimen of this sand and mud can be run, with as much of the finest "
-        f"solids and of the mud left out as may be{passing}: {subject}{words}; give coarser or "
-        "fewer solids (--mud-d10, --mud-d50, --mud-d90, --solids), a finer sand (--sand-d10, "
-        "--sand-d50, --sand-d90), or another flow (--overbalance, --viscosity)"
+        f"solids and of the mud left out as may be{passing}: {subject}{words}; give {smaller}"
+        "coarser or fewer solids (--mud-d10, --mud-d50, --mud-d90, --solids), a finer sand "
+        "(--sand-d10, --sand-d50, --sand-d90), or another flow (--overbalance, --viscosity)"
     )
 
 
@@ -443,7 +448,7 @@ def _value(value: Any) -> str:
         return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(_value(one) for one in value) + "]"
-    return json.dumps(value)
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _comment(text: str) -> list[str]:
@@ -515,8 +520,9 @@ def _cut_note(design: Design, throat: float) -> str:
     )
 
 
-def left_out(design: Design) -> Iterator[str]:
-    """What of the sand and the mud is not in the case, and whether that was enough."""
+def left_out(design: Design, folder: Path) -> Iterator[str]:
+    """What of the sand and the mud is not in the case, and what a case that takes too long takes
+    where more is left out; `folder` is where files of sizes are looked for."""
     choice, curve = design.choice, design.case.fines.curve
     if choice.sand_cut > 1.0:
         yield f"left out: the finest {choice.sand_cut:g} % of the sand"
@@ -527,5 +533,11 @@ def left_out(design: Design) -> Iterator[str]:
     if design.seconds > 1.05 * design.budget.seconds:
         yield (
             f"longer than the {spoken_time(design.budget.seconds)} of --size "
-            f"{design.budget.name}: no more can be left out; coarser or fewer solids are faster"
+            f"{design.budget.name}, as half of the solids are to stay; with a higher fines.cut:"
         )
+        for factor in HIGHER_CUTS:
+            cut = float(f"{factor * curve.low:.2g}")
+            with suppress(CaseError):
+                one = _design(design.answers, replace(choice, cut=cut), design.budget, folder)
+                gone = 100 * one.case.fines.curve.below
+                yield f'  cut = "{um(cut)}": {spoken_time(one.seconds)}, without {gone:.0f} %'

@@ -128,6 +128,12 @@ class InvasionScales(Scales):
     deposit_overlap: float
     sticking: Sticking
 
+    @property
+    def stiffness(self) -> float:
+        """Of the stiffest contact, N/m, as `run.stiffness_N_m` has it."""
+        some = (one for one in self.contacts.values() if not one.elastic or "fine" in one.pair)
+        return max(one.normal_stiffness for one in some)
+
 
 def scales_of(case: Case) -> Scales:
     """All scales of a case; InvasionScales when it has fines.

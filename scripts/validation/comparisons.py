@@ -221,7 +221,8 @@ def draw_differences(axes: Any, lines: Sequence[Finding]) -> None:
         colour = BLUE if abs(line.over) <= 1 else ORANGE
         marker = "o" if abs(line.over) < 6 else ">" if line.over > 0 else "<"
         axes.plot(min(6.0, max(-6.0, line.over)), place, marker, color=colour)
-    axes.set_yticks(range(len(shown)), [line.what for line in shown], fontsize=8)
+        axes.text(0.01, place + 0.2, line.what, transform=axes.get_yaxis_transform())
+    axes.set(yticks=[], ylim=(-0.7, len(shown) - 0.2))
     axes.set(xlabel="difference over the allowed one (grey: holds)")
 
 
@@ -252,10 +253,11 @@ def command(name: str, chapter: Chapter, arguments: Sequence[str]) -> int:
     lines = findings(comparisons, rows)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / f"{name}.md", table(lines))
-    figure = Figure(figsize=(13.0, 5.5), layout="constrained", dpi=110)
-    left, right = figure.subplots(1, 2)
-    draw_differences(left, lines)
-    chapter.panel(right, rows)
+    heights = (0.4 * len(lines) + 0.6, 4.0)
+    figure = Figure(figsize=(5.2, sum(heights)), layout="constrained", dpi=130)
+    above, below = figure.subplots(2, height_ratios=heights)
+    draw_differences(above, lines)
+    chapter.panel(below, rows)
     with replacing(out / f"{name}.png") as part:
         figure.savefig(part)
     print(table(lines))

@@ -1,9 +1,9 @@
 """The one picture of a study: signed errors in percent with their bands, against run time."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pandas as pd
 
@@ -16,23 +16,37 @@ if TYPE_CHECKING:
 CURVES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5A5A5A", "#8C564B")
 """Okabe and Ito (2008), which readers with any colour vision can tell apart."""
 MARKERS = "osD^vP<X"
-WIDTH, HEIGHT, DPI = 3.6, 2.2, 190
+WIDTH, HEIGHT, ROW, DPI = 3.6, 2.2, 0.32, 190
 """Inches: a phone shows the whole width with letters of its own size."""
 COSTS = {"core_s": "core seconds", "steps": "steps"}
 
 
 def draw(panels: Sequence[Mapping[str, Any]], rows: pd.DataFrame, path: Path) -> None:
-    """Draw one axes below the other, each with one quantity of some series."""
+    """Draw one axes below the other, each with one quantity of some series.
+
+    A panel with `lines` has a line of words for each value, any other has run time along x.
+    """
+    shown = [panel for panel in panels if _series(panel, rows)]
+    lines = [_lines(panel, rows) if "lines" in panel else [] for panel in shown]
+    heights = [ROW * len(own) + 0.55 if own else HEIGHT for own in lines]
+
+    def fill(places: Sequence["Axes"]) -> None:
+        for panel, own, axes in zip(shown, lines, places, strict=False):
+            if own:
+                _draw_lines(axes, own, panel)
+            else:
+                _draw_panel(axes, panel, rows)
+
+    _save(path, heights or [HEIGHT], fill)
+
+
+def _save(path: Path, heights: Sequence[float], fill: Callable[[Sequence["Axes"]], None]) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    shown = [panel for panel in panels if _series(panel, rows)]
-    with rc_context({"font.size": 7.5, "axes.titlesize": 7.5, "legend.fontsize": 6.5}):
-        size = (WIDTH, HEIGHT * max(len(shown), 1))
-        figure = Figure(figsize=size, layout="constrained")
-        places = figure.subplots(max(len(shown), 1), squeeze=False)[:, 0]
-        for panel, axes in zip(shown, places, strict=False):
-            _draw_panel(axes, panel, rows)
+    with rc_context({"font.size": 8, "axes.titlesize": 8, "legend.fontsize": 7}):
+        figure = Figure(figsize=(WIDTH, sum(heights)), layout="constrained")
+        fill(figure.subplots(len(heights), squeeze=False, height_ratios=heights)[:, 0])
         with replacing(path) as part:
             figure.savefig(part, dpi=DPI, format="png")
 
@@ -91,33 +105,51 @@ def _draw_panel(axes: "Axes", panel: Mapping[str, Any], rows: pd.DataFrame) -> N
 
 
 def _scale(axes: "Axes", points: Sequence[Level], panel: Mapping[str, Any]) -> None:
-    """Run time on a logarithm; errors too if they are magnitudes, else signed about zero."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, SymmetricalLogLocator
+    """Run time on a logarithm, errors by `_error_scale`."""
+    from matplotlib.ticker import LogLocator
 
-    plain = FuncFormatter(lambda value, _: f"{value:g}")
-    sizes = [100 * max(abs(one.error), one.band) for one in points]
-    sizes = [size for size in sizes if size > 0] or [1.0]
     axes.set_xscale("log")
     few = max(one.cost for one in points) < 10 * min(one.cost for one in points)
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
+    _plain(axes.xaxis)
+    _error_scale(axes, "y", [(100 * one.error, 100 * one.band) for one in points], panel)
+    axes.margins(x=0.1)
+    axes.grid(alpha=0.3, linewidth=0.5)
+
+
+def _error_scale(
+    axes: "Axes", way: str, points: Sequence[tuple[float, float]], panel: Mapping[str, Any]
+) -> None:
+    """Errors and bands in percent: shares as they are, magnitudes on a logarithm, others signed
+    about zero and on a logarithm beyond."""
+    from matplotlib.ticker import LogLocator, SymmetricalLogLocator
+
+    axis = getattr(axes, f"{way}axis")
+    sizes = [max(abs(error), band) for error, band in points]
+    sizes = [size for size in sizes if size > 0] or [1.0]
+    if panel.get("share"):
+        axes.set(**{f"{way}lim": (-4, 104)})
+        return
     if panel.get("magnitude"):
-        axes.set_yscale("log", nonpositive="clip")
-        axes.set_ylim(
-            0.3 * min(100 * abs(one.error) for one in points if one.error), 3 * max(sizes)
-        )
-        axes.yaxis.set_major_locator(LogLocator(numticks=6))
+        axes.set(**{f"{way}scale": "log"})
+        least = min(abs(error) for error, _ in points if error)
+        axes.set(**{f"{way}lim": (0.3 * least, 3 * max(sizes))})
+        axis.set_major_locator(LogLocator(numticks=6))
     else:
         least = max(min(sizes), max(sizes) / 10.0 ** panel.get("decades", 2))
         linear = 10.0 ** math.floor(math.log10(least))
-        axes.set_yscale("symlog", linthresh=linear)
-        axes.yaxis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=linear))
-        axes.axhline(0.0, color="black", linewidth=0.7)
-        axes.margins(y=0.12)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(plain)
-        axis.set_minor_formatter(NullFormatter())
-    axes.margins(x=0.1)
-    axes.grid(alpha=0.3, linewidth=0.5)
+        getattr(axes, f"set_{way}scale")("symlog", linthresh=linear)
+        axis.set_major_locator(SymmetricalLogLocator(base=10, linthresh=linear))
+        (axes.axhline if way == "y" else axes.axvline)(0.0, color="black", linewidth=0.7)
+        axes.margins(**{way: 0.12})
+    _plain(axis)
+
+
+def _plain(axis: Any) -> None:
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _short(value: str) -> str:
@@ -131,31 +163,64 @@ def _short(value: str) -> str:
     return f"{number:.3g}".replace("e+0", "e").replace("e-0", "e-")
 
 
+class _Line(NamedTuple):
+    """An error with its band and the words above it; an open dot is not resolved."""
+
+    words: str
+    error: float
+    band: float
+    resolved: bool
+    colour: str
+
+
+def _lines(panel: Mapping[str, Any], rows: pd.DataFrame) -> list[_Line]:
+    """A line for each value; `lines` says it with {series}, {value} and {cost} in seconds."""
+    made = []
+    for number, name in enumerate(_series(panel, rows)):
+        series = name.removesuffix(panel.get("common", "")).removeprefix(panel.get("begin", ""))
+        for one in levels(rows, name, panel["quantity"]):
+            value = _short(one.value)
+            if among(value, panel.get("values", "*")):
+                words = panel["lines"].format(series=series, value=value, cost=f"{one.cost:.2g}")
+                words = words.replace(" to own", "")
+                colour = CURVES[number % len(CURVES)]
+                sure = one.resolved or "label" in panel
+                made.append(_Line(words, one.error, one.band, sure, colour))
+    return made
+
+
+def _draw_lines(axes: "Axes", lines: Sequence[_Line], panel: Mapping[str, Any]) -> None:
+    size = 7 if max(len(one.words) for one in lines) < 52 else 6.2
+    for place, one in enumerate(reversed(lines)):
+        face = one.colour if one.resolved else "white"
+        axes.errorbar(
+            100 * one.error, place, xerr=100 * one.band, fmt="o", color=one.colour, mfc=face,
+            capsize=2, markersize=4,
+        )  # fmt: skip
+        axes.text(
+            0.01, place + 0.24, one.words, fontsize=size, transform=axes.get_yaxis_transform(),
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
+        )  # fmt: skip
+    _error_scale(axes, "x", [(100 * one.error, 100 * one.band) for one in lines], panel)
+    if "limits" in panel:
+        axes.set_xlim(panel["limits"])
+    label = panel.get("label", "error, % (open: not resolved)")
+    axes.set(xlabel=label, ylim=(-0.6, len(lines) - 0.2), yticks=[])
+    axes.set_title(panel.get("title", ""))
+    axes.grid(alpha=0.3, linewidth=0.5, axis="x")
+
+
 def draw_answer(shortcuts: Sequence[Shortcut], path: Path) -> None:
     """Draw the error that each shortcut makes, one below the other, and what it saves."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import FuncFormatter
-
-    with rc_context({"font.size": 7.5}):
-        figure = Figure(figsize=(WIDTH, 0.42 * len(shortcuts) + 0.7), layout="constrained")
-        axes = figure.subplots()
-        for place, one in enumerate(reversed(shortcuts)):
-            error, band = 100 * one.level.error, 100 * one.level.band
-            colour = CURVES[0] if one.resolved else CURVES[6]
-            face = colour if one.resolved else "white"
-            axes.errorbar(
-                error, place, xerr=band, fmt="o", color=colour, mfc=face, capsize=2, markersize=4
-            )
-            words = f"{one.says}: {one.error_of}, {1 / one.saves:.2g} × time"
-            where = axes.get_yaxis_transform()
-            axes.text(0.01, place + 0.26, words, fontsize=6.2, transform=where)
-        axes.axvline(0.0, color="black", linewidth=0.7)
-        axes.set_xscale("symlog", linthresh=1.0)
-        axes.set_xlim(-100, 100)
-        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:+g}"))
-        axes.set(xlabel="error, % (open: not resolved)", ylim=(-0.6, len(shortcuts) - 0.3))
-        axes.set_yticks([])
-        axes.grid(alpha=0.3, linewidth=0.5, axis="x")
-        with replacing(path) as part:
-            figure.savefig(part, dpi=DPI, format="png")
+    lines = [
+        _Line(
+            f"{one.says}: {one.error_of}, {1 / one.saves:.2g} × time",
+            one.level.error,
+            one.level.band,
+            one.resolved,
+            CURVES[0] if one.resolved else CURVES[6],
+        )
+        for one in shortcuts
+    ]
+    panel = {"limits": (-100, 100), "decades": 2}
+    _save(path, [ROW * len(lines) + 0.4], lambda places: _draw_lines(places[0], lines, panel))

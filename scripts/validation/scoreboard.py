@@ -8,6 +8,7 @@ docs/evidence/scoreboard.md. Nothing here is fitted to a row.
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from scipy.stats import binomtest, spearmanr
 from scipy.stats import t as student
 
 from fdnet.case.file import case_from
+from fdnet.classes.capture import HAMAKER, Bed, collector_efficiency
 from fdnet.network.field.field import velocity_field
 from fdnet.network.flow.sections import whole_permeability
 from fdnet.network.network import build_network
@@ -132,8 +134,8 @@ NAMED = {"equal": "equal spheres", "sieved": "20-40 mesh sand"}
 
 # ---- Rows 6 and 7. What single grains catch: the closed form, and tracers in resolved flow.
 
-PAPER = {"diameter": 1e-6, "grain": 5e-4, "velocity": 1.4e-4, "porosity": 0.40}
-PAPER |= {"density": 1050.0, "fluid": 998.0, "viscosity": 1e-3, "kelvin": 293.0, "hamaker": 1e-20}
+PAPER = Bed(diameter=5e-4, porosity=0.40, velocity=1.4e-4, viscosity=1e-3, density=998.0)
+"""The paper's example, at 293 K and 1e-20 J."""
 
 
 def happel(porosity: float) -> float:
@@ -142,39 +144,20 @@ def happel(porosity: float) -> float:
     return 2.0 * (1.0 - g**5) / (2.0 - 3.0 * g + 3.0 * g**5 - 2.0 * g**6)
 
 
-def contact_efficiency(
-    diameter: float,
-    grain: float,
-    velocity: float,
-    porosity: float,
-    density: float,
-    fluid: float,
-    viscosity: float,
-    kelvin: float,
-    hamaker: float,
-) -> tuple[float, float, float]:
-    """Single-collector efficiency by diffusion, interception and settling, SI units.
+def efficiency(diameter: float, density: float, bed: Bed) -> float:
+    """Single-collector contact efficiency by the law of the size classes."""
+    return float(collector_efficiency(np.array([diameter]), np.array([density]), bed)[0])
 
-    Tufenkji and Elimelech 2004, Environ. Sci. Technol. 38, 529, equation 17; the attraction number
-    A / (12 pi mu a^2 U) takes the radius a of the fine.
-    """
-    shape, radius, thermal = happel(porosity), 0.5 * diameter, 1.380649e-23 * kelvin
-    size = diameter / grain
-    peclet = velocity * grain * 6.0 * math.pi * viscosity * radius / thermal
-    waals = hamaker / thermal
-    attraction = hamaker / (12.0 * math.pi * viscosity * radius**2 * velocity)
-    gravity = 2.0 / 9.0 * radius**2 * (density - fluid) * 9.81 / (viscosity * velocity)
-    return (
-        2.4 * shape ** (1.0 / 3.0) * size**-0.081 * peclet**-0.715 * waals**0.052,
-        0.55 * shape * size**1.675 * attraction**0.125,
-        0.22 * size**-0.24 * gravity**1.11 * waals**0.053,
-    )
+
+def by_interception(diameter: float, bed: Bed) -> float:
+    """Its part 0.55 A_s N_R^1.675 N_A^0.125; the attraction number takes the fine's radius."""
+    attraction = HAMAKER / (3.0 * math.pi * bed.viscosity * diameter**2 * bed.velocity)
+    return 0.55 * happel(bed.porosity) * (diameter / bed.diameter) ** 1.675 * attraction**0.125
 
 
 def collected(trial: Trial) -> Seen:
-    """A_s and the three parts of the paper's example."""
-    parts = contact_efficiency(**PAPER)
-    return {"A_s": happel(0.40), "eta": sum(parts), "eta, interception": parts[1]}
+    """A_s and the efficiency of the paper's example."""
+    return {"A_s": happel(PAPER.porosity), "eta": efficiency(1e-6, 1050.0, PAPER)}
 
 
 NEAR, SHORTEST, LONGEST = 0.3, 0.002, 0.03
@@ -237,7 +220,7 @@ def judge_collected(rows: pd.DataFrame) -> list[Finding]:
     caught = rows[(rows.comparison == "7") & (rows.quantity == "eta")]
     caught = caught[caught.value.astype(float) == 0.02]
     if len(caught):
-        law = contact_efficiency(**PAPER | {"diameter": 0.02 * PAPER["grain"]})[1]
+        law = by_interception(0.02 * PAPER.diameter, PAPER)
         mean, half = mean_band(caught.observed / law)
         what = "6: tracers of 0.02 D over η₀'s part by interception, 10 µm"
         seen, over = (
@@ -600,11 +583,9 @@ def judge_rate(rows: pd.DataFrame) -> list[Finding]:
     """Row 4 by the law of row 6, which the size classes take: lambda u at 0.95 over 0.66 cm/s."""
     ratios = []
     for grain in (0.84e-3, 1.42e-3, 2.0e-3):
-        case = PAPER | {"diameter": 8e-6, "grain": grain, "density": 2710.0}
-        slow, fast = (
-            u * sum(contact_efficiency(**case | {"velocity": 0.4 * u})) for u in (0.0066, 0.0095)
-        )
-        ratios.append(fast / slow)
+        slow, fast = (replace(PAPER, diameter=grain, velocity=0.4 * u) for u in (0.0066, 0.0095))
+        rates = [bed.velocity * efficiency(8e-6, 2710.0, bed) for bed in (slow, fast)]
+        ratios.append(rates[1] / rates[0])
     what = "4: CaCO₃ in sand of 840-2000 µm, rate constant at 0.95 over 0.66 cm/s"
     seen = f"{min(ratios):.3f} to {max(ratios):.3f}, grains of 2 to 0.84 mm"
     over = max(abs(one - 1) for one in ratios) / 0.1

@@ -165,8 +165,8 @@ NODES = 16
 
 @pytest.mark.parametrize("period", [False, True])
 def test_fluxes_against_rational_arithmetic(period):
-    """The error of every flux, over the throughput."""
-    for decades, within in [(6, 1e-9), (12, 1e-8), (16, 1e-8), (20, 1e-6)]:
+    """The error of the throughput, and of every flux over it."""
+    for decades, within, each in [(6, 1e-9, 1e-9), (12, 1e-9, 1e-9), (20, 1e-9, 1e-4)]:
         solved = 0
         for seed in range(25):
             ends, g, jump = random_links(seed, decades=decades, period=period)
@@ -176,14 +176,16 @@ def test_fluxes_against_rational_arithmetic(period):
             throughput, exact = exact_balance(ends, g, jump, NODES)
             flux = balance_links(ends, g, jump, NODES).flux
             assert flux @ jump == pytest.approx(throughput, rel=within)
-            assert flux == pytest.approx(exact, abs=within * throughput)
+            assert flux == pytest.approx(exact, abs=each * throughput)
             net = np.bincount(ends[:, 0], flux, NODES) - np.bincount(ends[:, 1], flux, NODES)
             assert np.abs(net[1:]).max() <= 1e-6 * throughput
         assert solved > 15
 
 
 def test_contrasts_that_cannot_be_held_are_refused(monkeypatch):
-    """Without contraction of strong groups: no number is better than a wrong one."""
-    monkeypatch.setattr(solver, "CONTRASTS", (1e99,))
+    """Without a limit on stiff links: no number is better than a wrong one."""
+    g = np.array([1e10, 1e6, 1e2, 1e-12, 1e-16, 1e-12, 1e2, 1e6, 1e10])
+    assert solve_flow(chain(9), g).inflow == pytest.approx(1 / np.sum(1 / g), rel=1e-9)
+    monkeypatch.setattr(solver, "CONTRAST", 1e99)
     with pytest.raises(FlowError):
-        solve_flow(chain(9), np.array([1e10, 1e6, 1e2, 1e-12, 1e-16, 1e-12, 1e2, 1e6, 1e10]))
+        solve_flow(chain(9), g)

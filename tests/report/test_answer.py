@@ -255,8 +255,12 @@ def test_each_number_of_two_laws_names_its_own():
     more |= {"invasion_depth_m": 2e-3, "cake_thickness_m": 0.0, "law": "thesis", **counts}
     said = {one.name: one.text for one in facts(SUMMARY | more | FLOW)}
     assert said["permeability"].endswith("26.7 % lost by the law thesis")
-    assert said["flow"].startswith("72.2 % lost as the flow met it last: by section-archie with")
-    assert "flow" not in {one.name for one in facts(SUMMARY | more | {"damage_law": "thesis"})}
+    assert said["k of the flow"].startswith(
+        "72.2 % lost as the simulated flow met it last: by section-archie with"
+    )
+    assert "k of the flow" not in {
+        one.name for one in facts(SUMMARY | more | {"damage_law": "thesis"})
+    }
 
 
 def test_the_answer_is_a_sentence_to_act_on():

@@ -290,11 +290,10 @@ def solved_field(
     inside = on_grid(lattice, *deposit)
     fines = frozen(deposit[0][inside]), frozen(deposit[1][inside])
     position, radius = map(np.concatenate, zip(grains, fines, strict=True))
-    grain = float(grains[1].mean()) if len(grains[1]) else FEWEST_CELLS * lattice.unit
     return VelocityField(
         grains=grains,
         fines=fines,
-        solved=solve(lattice, position, radius, grain=grain, slip=tolerance),
+        solved=solve(lattice, position, radius, slip=tolerance),
         inside=frozen(inside),
     )
 

@@ -8,7 +8,6 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pyamg
@@ -18,7 +17,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from scipy.sparse.linalg import splu
 
 from fdnet.errors import FlowError
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled
 from fdnet.spheres.snapshot import Array, one_line
 
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
@@ -182,21 +181,8 @@ def multigrid(matrix: sparse.csr_matrix) -> Solve:
     return solve
 
 
-class Rows(NamedTuple):
-    """Where the rows of a matrix begin, the columns of its entries, and their values."""
-
-    first: Array
-    column: Array
-    value: Array
-
-
 def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
-    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner.
-
-    The levels are pyamg's, and the numbers of a cycle are those of its own to the last digit.
-    Called one by one from Python its operations take several times as long, for the levels of a
-    pack hold a few thousand pores at most; it also computes two norms that are not needed.
-    """
+    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner."""
     hierarchy = pyamg.ruge_stuben_solver(
         matrix,
         strength=("classical", {"theta": STRENGTH}),
@@ -206,68 +192,8 @@ def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
         max_coarse=10,
         coarse_solver="splu",
     )
-    levels = [
-        (
-            *(Rows(one.indptr, one.indices, one.data) for one in (level.A, level.P)),
-            level.P.shape[1],
-        )
-        for level in hierarchy.levels[:-1]
-    ]
-    last = hierarchy.levels[-1].A
-
-    def cycle(source: Array) -> Array:
-        passed = []
-        for own, prolongation, count in levels:
-            solution, coarse = np.zeros(len(source)), np.zeros(count)
-            _down(own, prolongation, solution, source, coarse)
-            passed.append((own, prolongation, solution, source))
-            source = coarse
-        below = np.asarray(hierarchy.coarse_solver(last, source))
-        for own, prolongation, solution, given in reversed(passed):
-            _up(own, prolongation, solution, given, below)
-            below = solution
-        return below
-
+    cycle: Callable[[Array], Array] = hierarchy.aspreconditioner(cycle="V").matvec
     return cycle
-
-
-@compiled_in_place
-def _relax(matrix: Rows, row: int, solution: Array, source: Array) -> None:
-    """Sets the solution of one row to what balances it; a row without a diagonal stays."""
-    total, diagonal = 0.0, 0.0
-    for entry in range(matrix.first[row], matrix.first[row + 1]):
-        if matrix.column[entry] == row:
-            diagonal = matrix.value[entry]
-        else:
-            total += matrix.value[entry] * solution[matrix.column[entry]]
-    if diagonal != 0.0:
-        solution[row] = (source[row] - total) / diagonal
-
-
-@compiled_in_place
-def _down(matrix: Rows, prolongation: Rows, solution: Array, source: Array, coarse: Array) -> None:
-    """A forward sweep from a solution of 0, and what is left added to the next level, `coarse`."""
-    for row in range(len(source)):
-        _relax(matrix, row, solution, source)
-    for row in range(len(source)):
-        total = 0.0
-        for entry in range(matrix.first[row], matrix.first[row + 1]):
-            total += matrix.value[entry] * solution[matrix.column[entry]]
-        missing = source[row] - total
-        for entry in range(prolongation.first[row], prolongation.first[row + 1]):
-            coarse[prolongation.column[entry]] += prolongation.value[entry] * missing
-
-
-@compiled_in_place
-def _up(matrix: Rows, prolongation: Rows, solution: Array, source: Array, coarse: Array) -> None:
-    """Adds what the next level gives, `coarse`, to the solution, and sweeps backward."""
-    for row in range(len(solution)):
-        total = 0.0
-        for entry in range(prolongation.first[row], prolongation.first[row + 1]):
-            total += prolongation.value[entry] * coarse[prolongation.column[entry]]
-        solution[row] += total
-    for row in range(len(solution) - 1, -1, -1):
-        _relax(matrix, row, solution, source)
 
 
 def _total(values: Array) -> float:
@@ -344,25 +270,15 @@ def groups(ends: Array, count: int) -> Array:
 
 def winding_groups(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
     """Connected group (n,) of each of `count` nodes, and whether that group winds (n,)."""
-    group, winds, _ = _joined(
+    group, winds = _joined(
         np.ascontiguousarray(ends, np.int64), np.ascontiguousarray(jump, float), count
     )
     return group, winds[group]
 
 
-def cancelling_pressures(ends: Array, jump: Array, count: int) -> Array:
-    """Pressures (n,) of groups that do not wind, which cancel the jump of every link.
-
-    p_b = p_a + jump, from 0 at the first node of each group.
-    """
-    ends = np.ascontiguousarray(ends, np.int64)
-    rise: Array = _joined(ends, np.ascontiguousarray(jump, float), count)[2]
-    return rise
-
-
 @compiled
-def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array, Array]:
-    """Group (n,) of each node, whether each group (G,) winds, and the pressure (n,) of each node.
+def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array]:
+    """Group (n,) of each node, and whether each group (G,) winds.
 
     Every node knows another of its group and the pressure over it; links join two trees of such
     nodes or close a loop (Tarjan 1975, J. ACM 22, 215). The root of a tree is its first node.
@@ -387,7 +303,7 @@ def _joined(ends: Array, jump: Array, count: int) -> tuple[Array, Array, Array]:
             roots += 1
         else:
             group[node] = group[root]
-    return group, winds, rise
+    return group, winds
 
 
 @compiled
@@ -411,13 +327,15 @@ def _root(parent: Array, rise: Array, node: int) -> int:
 # Node 0 and the first node of every further group have the pressure 0.
 #
 # The critical conductance of a node is that of the weakest link in the best closed loop with a
-# jump through it. Links far more conductive than that are stiff: their pressure difference is
-# smaller than a number can hold. Their nodes are contracted into one, and their fluxes follow from
-# the balance within the contracted group, where the same is done again.
+# jump through it. No more than a few times that flows through the node per unit of drive. A link
+# that is far more conductive takes next to none of the drive, and its pressure difference is
+# smaller than a number can hold. So it is taken as `CONTRAST` times the critical conductance.
+# The throughput changes by some 1 / CONTRAST; where such links lie side by side, the share of
+# each in their flux follows the conductance that they are taken as.
 
 
-CONTRASTS = (1e8, 1e6, 1e10)
-"""Ratios of conductance between levels of stiffness, in the order in which they are tried."""
+CONTRAST = 1e14
+"""Largest conductance of a link over the critical one of its nodes."""
 STEP = 10.0
 """Factor within which the critical conductance is determined."""
 SETTLED = 1e-9
@@ -432,8 +350,8 @@ class Balance:
     Attributes:
         pressure: (n,) over the unit of the jumps.
         flux: (K,) from the first to the second end, in units of conductance times jump.
-        defect: sum of the imbalances of the nodes and of the errors of the links' own equations,
-            over the throughput; it bounds the relative error of the throughput.
+        defect: sum of the imbalances of the nodes over the throughput; it bounds the relative
+            error of the throughput.
         method: how the system was solved.
     """
 
@@ -445,28 +363,11 @@ class Balance:
     __repr__ = one_line
 
 
-class _Stage(NamedTuple):
-    """The links of one level of stiffness; the nodes that higher levels join are one node.
-
-    Attributes:
-        links: (L,) indices of the links.
-        label: (n,) number of the contracted node of each node.
-        free: (m,) whether the pressure of each contracted node is unknown; else it is 0.
-        balances: the system of equations of the free nodes.
-    """
-
-    links: Array
-    label: Array
-    free: Array
-    balances: Balances
-
-
 def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> Balance:
     """Balance of all nodes, every one of which must be in a group that winds.
 
-    The levels of stiffness differ by a contrast of 1e8. Where links of like conductance fall on
-    both sides of that border and the sweeps do not settle, another contrast is tried. The best
-    balance is returned, and the caller judges its `defect`.
+    What the fluxes lack in balance is solved for again, until the defect is `SETTLED`. Fluxes add
+    up by increments, never as differences of nearly equal pressures. The caller judges the defect.
 
     Args:
         ends: (K, 2) nodes that the links join.
@@ -474,67 +375,40 @@ def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> B
         jump: (K,) of the links.
         count: number of nodes.
     """
-    tried = []
-    for contrast in CONTRASTS:
-        level = stiffness(ends, conductance, jump, count, contrast=contrast)
-        tried.append(_balance(ends, conductance, jump, level, count))
-        if tried[-1].defect <= SETTLED or not level.any():
-            break
-    return min(tried, key=lambda one: one.defect)
-
-
-def _balance(ends: Array, conductance: Array, jump: Array, level: Array, count: int) -> Balance:
-    """Balance level by level, with the `level` (K,) of each link, repeated for what is left over.
-
-    Left over are the imbalances, and the pressure differences within the contracted groups, which
-    the links next to them did not see. Fluxes add up by increments, never as differences of nearly
-    equal pressures.
-    """
-    stiff, pressure = level > 0, np.zeros(count)
-    if stiff.any():
-        pressure = cancelling_pressures(ends[stiff], jump[stiff], count)
-    drive, level = jump + _difference(pressure, ends), level.copy()
-    for at in range(int(level.max(initial=0))):
-        # links between nodes that higher levels contract into one belong to these
-        label = groups(ends[level > at], count)
-        level[(level == at) & (label[ends[:, 0]] == label[ends[:, 1]])] = at + 1
-    stages = [
-        _stage(ends, conductance, level, at, count) for at in range(int(level.max(initial=0)) + 1)
-    ]
-    flux, defect, allowed = np.zeros(len(ends)), np.inf, None
+    conductance = held_conductance(ends, conductance, jump, count)
+    free = np.ones(count, bool)
+    free[np.unique(groups(ends, count), return_index=True)[1]] = False
+    index, tied = np.cumsum(free) - 1, np.zeros(int(free.sum()))
+    for side in (0, 1):
+        held = free[ends[:, side]] & ~free[ends[:, 1 - side]]
+        tied += np.bincount(index[ends[held, side]], conductance[held], len(tied))
+    inner = np.all(free[ends], axis=1)
+    balances = Balances(index[ends[inner]], conductance[inner], tied)
+    pressure, flux, defect, allowed = np.zeros(count), conductance * jump, np.inf, None
     for _ in range(MOST_SWEEPS):
-        net = _net(ends, flux, count)
-        step, gain, drive = _sweep(stages, ends, conductance, drive, net, allowed)
-        pressure, flux, before = pressure + step, flux + gain, defect
+        step, before = np.zeros(count), defect
+        step[free] = balances.solve(-_net(ends, flux, count)[free], imbalance=allowed)
+        pressure = pressure + step
+        flux = flux + conductance * (step[ends[:, 0]] - step[ends[:, 1]])
         throughput = float(flux @ jump)
-        off = _total(_net(ends, flux, count)) + _total(conductance * drive)
-        defect = off / throughput if throughput > 0 else np.inf
+        defect = _total(_net(ends, flux, count)) / throughput if throughput > 0 else np.inf
         allowed = 0.3 * SETTLED * abs(throughput)
         if defect <= SETTLED or not defect < 0.7 * before:
             break
-    return Balance(
-        pressure=pressure - pressure[0], flux=flux, defect=defect, method=stages[0].balances.method
-    )
+    return Balance(pressure=pressure, flux=flux, defect=defect, method=balances.method)
 
 
-def stiffness(
-    ends: Array, conductance: Array, jump: Array, count: int, *, contrast: float = CONTRASTS[0]
-) -> Array:
-    """Level (K,) of stiffness of each link.
+def held_conductance(ends: Array, conductance: Array, jump: Array, count: int) -> Array:
+    """The conductance (K,) of links, at most `CONTRAST` times the critical one of their nodes.
 
-    It is 0 up to `contrast` times the critical conductance of the nodes, 1 up to its square times
-    that, and so on. The critical conductance of a node is the greatest at which the links that are
-    as good or better still join it to a closed loop with a jump (Ambegaokar, Halperin and Langer
-    1971); it is determined within a factor of 10. No more than a few times that flows through the
-    node per unit of drive, so a link of level 1 takes at most some 1 / contrast of the drive.
+    The critical conductance of a node is the greatest at which the links that are as good or
+    better still join it to a closed loop with a jump (Ambegaokar, Halperin and Langer 1971); it is
+    determined within a factor of 10.
     """
-    level = np.zeros(len(ends), int)
-    if not len(ends):
-        return level
     lowest, highest = float(conductance.min()), float(conductance.max())
-    if highest <= contrast * lowest:
-        return level
-    critical, bound = np.zeros(count), highest / contrast
+    if highest <= CONTRAST * lowest:
+        return conductance
+    critical, bound = np.zeros(count), highest / CONTRAST
     while True:
         strong = conductance >= bound
         winds = winding_groups(ends[strong], jump[strong], count)[1]
@@ -542,61 +416,7 @@ def stiffness(
         if bound <= lowest or np.all(critical > 0):
             break
         bound = max(min(bound / STEP, float(conductance[~strong].max())), lowest)
-    ratio = conductance / np.maximum(critical[ends[:, 0]], critical[ends[:, 1]])
-    return np.maximum(np.ceil(np.log(ratio) / np.log(contrast)).astype(int) - 1, 0)
-
-
-def _stage(ends: Array, conductance: Array, level: Array, at: int, count: int) -> _Stage:
-    """The stage of the links of level `at`."""
-    links, label = np.flatnonzero(level == at), groups(ends[level > at], count)
-    pair, size = label[ends[links]], int(label.max(initial=-1)) + 1
-    free = np.ones(size, bool)
-    free[np.unique(groups(pair, size), return_index=True)[1]] = False
-    index = np.cumsum(free) - 1
-    own = conductance[links]
-    tied = np.zeros(int(free.sum()))
-    for side in (0, 1):
-        held = free[pair[:, side]] & ~free[pair[:, 1 - side]]
-        tied += np.bincount(index[pair[held, side]], weights=own[held], minlength=len(tied))
-    inner = np.all(free[pair], axis=1)
-    balances = Balances(index[pair[inner]], own[inner], tied)
-    return _Stage(links=links, label=label, free=free, balances=balances)
-
-
-def _sweep(
-    stages: list[_Stage],
-    ends: Array,
-    conductance: Array,
-    drive: Array,
-    net: Array,
-    allowed: float | None,
-) -> tuple[Array, Array, Array]:
-    """Increments of pressure (n,) and flux (K,), and the drive (K,) left for the next sweep.
-
-    The increments balance what drives the links, `drive` (K,), and what the nodes lack by the
-    `net` flux (n,) out of them, but for a sum of imbalances that is `allowed`. The drive that is
-    left is what the lower stages have since set up for the stiffer links.
-    """
-    flux, late, steps = np.zeros(len(ends)), np.zeros(len(ends)), []
-    for stage in stages:
-        own, pushed = conductance[stage.links], drive[stage.links]
-        net = net + _net(ends[stage.links], own * pushed, len(net))
-        lack = np.bincount(stage.label, weights=-net, minlength=len(stage.free))
-        pressure = np.zeros(len(stage.free))
-        pressure[stage.free] = stage.balances.solve(lack[stage.free], imbalance=allowed)
-        steps.append(pressure[stage.label])
-        gain = own * _difference(steps[-1], ends[stage.links])
-        net = net + _net(ends[stage.links], gain, len(net))
-        flux[stage.links] = gain + own * pushed
-    for at, stage in enumerate(stages):
-        for step in steps[at + 1 :]:
-            late[stage.links] += _difference(step, ends[stage.links])
-    return np.sum(steps, axis=0), flux, late
-
-
-def _difference(pressure: Array, ends: Array) -> Array:
-    """Pressure difference (K,) along each link."""
-    return pressure[ends[:, 0]] - pressure[ends[:, 1]]
+    return np.minimum(conductance, CONTRAST * critical[ends].max(axis=1))
 
 
 def _net(ends: Array, flux: Array, count: int) -> Array:

@@ -1,0 +1,191 @@
+"""The 1-D model against closed forms: filtration, Darcy, cake, skin, back-flow."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fdnet.formation.model import (
+    CakeOf,
+    Column,
+    Drive,
+    FineClass,
+    Release,
+    Rock,
+    cake_skin,
+    damage_skin,
+    march,
+    steep_grid,
+)
+from fdnet.run.answer import hawkins
+
+
+def grid(length, cells):
+    return np.linspace(0.0, length, cells + 1)
+
+
+ROCK = Rock(porosity=0.3, permeability=1e-12, damage=40.0)
+MUD = (FineClass("all", concentration=0.01, rate=30.0),)
+CORE = Column(edges=grid(0.1, 200), area=2e-3)
+VISCOSITY = 1e-3
+
+
+def flood(column, mud, pore_volumes, *, rock=ROCK, **more):
+    """At a constant rate of 1e-7 m3/s, for so many pore volumes."""
+    seconds = pore_volumes * rock.porosity * column.volume.sum() / 1e-7
+    return march(column, rock, mud, [Drive(seconds=seconds, rate=1e-7)], VISCOSITY, **more)
+
+
+@pytest.mark.parametrize("well", [np.inf, 0.05])
+def test_constant_filtration_is_exponential_straight_and_around_a_well(well):
+    """c = c0 exp(-rate depth), deposit = rate c0 (V - pore volume behind) / area exp(...)."""
+    column = replace(CORE, well=well)
+    end = flood(column, MUD, 40.0).end
+    depth, c0, rate = column.edges, 0.01, 30.0
+    steady = c0 * np.exp(-rate * depth[1:])
+    assert end.suspended[0] == pytest.approx(steady, rel=1e-9)
+    front = np.array([ROCK.porosity * column.volume[:j].sum() for j in range(201)])
+    seen = 40.0 * front[-1] - (front[:-1] + front[1:]) / 2
+    middle = (depth[:-1] + depth[1:]) / 2
+    area = column.area * (1 + middle / well)
+    exact = rate * c0 * seen / area * np.exp(-rate * middle)
+    assert end.deposit[0] == pytest.approx(exact, rel=2e-3)
+
+
+def langmuir_error(cells):
+    """Largest error of c / c0 against e^T / (e^X + e^T - 1), cells and steps refined together."""
+    rate, most, volumes = 30.0, 0.02, 8.0
+    mud = (FineClass("all", concentration=0.01, rate=rate, growth=-1 / most),)
+    column = Column(edges=grid(0.1, cells), area=2e-3)
+    end = flood(column, mud, volumes, fineness=4.0 / cells).end
+    depth = column.edges[1:]
+    passed = volumes * ROCK.porosity * 0.1 - ROCK.porosity * depth  # m of fluid since the front
+    X, T = rate * depth, rate * 0.01 * passed / most
+    exact = np.exp(T) / (np.exp(X) + np.exp(T) - 1)
+    middle = (column.edges[:-1] + depth) / 2
+    filled = (np.exp(T) - 1) / (np.exp(X) + np.exp(T) - 1)
+    assert np.all(end.deposit <= most)
+    assert end.deposit[0] / most == pytest.approx(np.interp(middle, depth, filled), abs=0.05)
+    return np.abs(end.suspended[0] / 0.01 - exact).max()
+
+
+def test_the_langmuir_solution_is_met_with_first_order():
+    coarse, fine, finer = map(langmuir_error, (50, 100, 200))
+    assert finer < 0.01
+    assert 1.7 < coarse / fine < 2.4
+    assert 1.7 < fine / finer < 2.4
+
+
+def test_no_fines_are_lost_or_made():
+    """Several classes, both directions, a cake: to 1e-12 of what was supplied."""
+    mud = (FineClass("coarse", 0.01, 80.0, 5.0), FineClass("fine", 0.02, 2.0, -3.0))
+    drives = [Drive(seconds=3e4, pressure=2e5), Drive(seconds=3e4, pressure=-1e5)] * 2
+    cake = CakeOf(porosity=0.4, permeability=1e-15)
+    for column in (CORE, Column(edges=steep_grid(0.3, 60, 1e-4), area=0.1, well=0.1)):
+        more = {"cake": cake, "closing": 0.05, "release": Release(share=0.6, rate=20.0)}
+        made = march(column, ROCK, mud, drives, VISCOSITY, **more)
+        end = made.end
+        where = end.kept(column, ROCK) + end.passed + end.returned
+        assert end.supplied == pytest.approx(where, rel=1e-12)
+        assert np.all(end.supplied > 0)
+        assert np.all(end.returned > 0)
+        assert min(end.suspended.min(), end.deposit.min()) >= 0
+
+
+def test_the_pressure_of_a_core_rises_in_a_line_after_the_breakthrough():
+    """dp / dp0 has the slope beta porosity c0 (1 - exp(-rate length)) a pore volume."""
+    rock = replace(ROCK, power=1.0)
+    made = flood(CORE, MUD, 50.0, rock=rock)
+    volumes = made.filtrate / (rock.porosity * CORE.volume.sum())
+    late = volumes > 10
+    slopes = np.diff(made.pressure[late] / made.pressure[0]) / np.diff(volumes[late])
+    exact = rock.damage * rock.porosity * 0.01 * (1 - np.exp(-30.0 * 0.1))
+    assert slopes == pytest.approx(exact, rel=1e-6)
+
+
+def test_the_face_closes_when_its_deposit_is_full():
+    """t* = deposit / (rate u c0) (Pang and Sharma 1997), and with a growing rate its logarithm."""
+    cake = CakeOf(porosity=0.5, permeability=1e-14)
+    made = flood(CORE, MUD, 50.0, closing=0.02, cake=cake)
+    assert made.closed_at == pytest.approx(0.02 / (30.0 * 1e-7 / 2e-3 * 0.01), rel=1e-12)
+    growing = (MUD[0]._replace(growth=50.0),)
+    made = flood(CORE, growing, 50.0, closing=0.02, cake=cake)
+    exact = np.log1p(50.0 * 0.02) / (50.0 * 30.0 * 1e-7 / 2e-3 * 0.01)
+    assert made.closed_at == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_cake_at_constant_pressure_is_ruths():
+    """t / V is a line in V, of slope mu c0 / (2 dp k_c (1 - phi_c - c0)) per area (Ruth 1935)."""
+    cake = CakeOf(porosity=0.4, permeability=1e-17)
+    drive = [Drive(seconds=3600.0, pressure=7e5)]
+    made = march(CORE, ROCK, MUD, drive, VISCOSITY, cake=cake, closing=0.0)
+    v = made.filtrate[1:] / CORE.area
+    slope, start = np.polyfit(v, made.time[1:] / v, 1)
+    assert slope == pytest.approx(VISCOSITY * 0.01 / (2 * 7e5 * 1e-17 * (0.6 - 0.01)), rel=1e-9)
+    assert start == pytest.approx(VISCOSITY * 0.1 / ROCK.permeability / 7e5, rel=1e-6)
+    assert made.time[-1] == 3600.0
+
+
+def test_one_damaged_zone_has_hawkins_skin():
+    """k/k0 of 0.141 over 1 mm at a radius of 108 mm: 0.056."""
+    column = Column(edges=grid(0.01, 100), area=1.0, well=0.108)
+    gone = np.where(np.arange(100) < 10, 1 / 0.141, 1.0)
+    skin = damage_skin(column, gone)
+    assert skin == pytest.approx(hawkins(0.141, well=0.108, damaged=0.109), rel=1e-12)
+    assert skin == pytest.approx(0.056, abs=5e-4)
+
+
+def test_a_wide_well_is_a_straight_core():
+    straight = flood(CORE, MUD, 5.0)
+    wide = flood(replace(CORE, well=1e7), MUD, 5.0)
+    assert wide.end.deposit == pytest.approx(straight.end.deposit, rel=1e-6)
+    assert wide.pressure == pytest.approx(straight.pressure, rel=1e-6)
+    narrow = flood(replace(CORE, well=0.05), MUD, 5.0)
+    assert narrow.end.deposit[0, -1] < 0.7 * straight.end.deposit[0, -1]
+
+
+def test_the_skin_of_a_cake_has_the_shapes_of_opm():
+    """Thickness h of a plate, well r, formation over cake permeability K (WellFilterCake)."""
+    h, r, ratio = 0.01, 0.1, 50.0
+    assert cake_skin("linear", h, r) * ratio == pytest.approx(ratio * h / r)
+    assert cake_skin("radial", h, r) == pytest.approx(np.log(np.sqrt(r**2 + 2 * r * h) / r))
+    assert cake_skin("linrad", h, r) == pytest.approx(np.log((r + h) / r))
+    assert cake_skin("inward", h, r) == pytest.approx(np.log(r / np.sqrt(r**2 - 2 * r * h)))
+    thin = [cake_skin(shape, 1e-6, r) for shape in ("linear", "radial", "linrad", "inward")]
+    assert thin == pytest.approx([1e-5] * 4, rel=2e-5)
+
+
+def test_a_schedule_keeps_rate_and_pressure():
+    drives = [Drive(seconds=100.0, rate=1e-7), Drive(seconds=200.0, pressure=1e5)]
+    made = march(CORE, ROCK, MUD, drives, VISCOSITY)
+    first = made.time <= 100.0
+    assert made.rate[first] == pytest.approx(1e-7, rel=1e-12)
+    assert made.pressure[~first] == pytest.approx(1e5, rel=1e-12)
+    assert made.filtrate[first][-1] == pytest.approx(1e-5, rel=1e-12)
+    assert np.sum(made.time == 100.0) == 1
+    assert made.time[-1] == 300.0
+
+
+def test_more_back_flow_returns_more_and_the_section_at_the_face_least():
+    """The trend of Egermann (SCA 2001-25)."""
+    forth = Drive(seconds=6e4, rate=1e-7)
+    returned = []
+    for seconds in (0.0, 1e4, 3e4, 1e6):
+        back = [Drive(seconds=seconds, rate=-1e-7)] if seconds else []
+        more = {"release": Release(share=0.8, rate=5.0), "taps": np.linspace(0.0, 0.1, 5)}
+        returned.append(march(CORE, ROCK, MUD, [forth, *back], VISCOSITY, **more).k_over_k0[-1])
+    assert np.all(np.diff(returned, axis=0) > 0)
+    assert np.all(np.diff(returned, axis=1) > 0)
+    held = 0.2 * 30.0 * 0.01 * 6e4 * 1e-7 / 2e-3 * (1 - np.exp(-30.0 * 0.025)) / (30.0 * 0.025)
+    assert returned[-1][0] == pytest.approx((1 + 40 * held) ** -2, rel=0.05)
+
+
+def test_a_cake_that_fills_the_well_ends_the_march():
+    column = Column(edges=grid(0.01, 20), area=1.0, well=0.05, outer=100.0)
+    cake = CakeOf(porosity=0.4, permeability=1e-11, shape="inward")
+    drive = [Drive(seconds=1e9, pressure=1e6)]
+    made = march(column, ROCK, MUD, drive, VISCOSITY, cake=cake, closing=0.0)
+    assert made.stopped == "full"
+    solids = made.end.cake.sum()
+    assert solids / (0.6 * 1.0 * 0.05 / 2) == pytest.approx(1.0, rel=0.06)
+    assert made.time[-1] < 1e9
