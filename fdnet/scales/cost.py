@@ -34,6 +34,8 @@ cache."""
 UPDATE_SECONDS = (0.03, 9.0e-5)
 """Seconds of one update of the flow that follows the deposit: at least, and for each grain and
 fine."""
+CLASSES_SECONDS = (4.0, 5.0e-3)
+"""Seconds of the fast model: at least, and for each grain and class."""
 FALLING_RATE = 0.6
 """Mean rate over the first, where the deposit slows the flow."""
 WAITING, TRICKLING = 2.0, 1.4
@@ -79,6 +81,11 @@ def cost_of(case: Case, scales: Scales) -> Cost:
     python = START_SECONDS + REPORT_SECONDS
     if not isinstance(case, InvasionCase) or not isinstance(scales, InvasionScales):
         return Cost(pack_seconds=pack, analyse_seconds=python + grains * SPHERE_SECONDS)
+    if case.by_classes:
+        least, each = CLASSES_SECONDS
+        invade = least + each * grains * (1 if case.invasion is None else case.invasion.classes)
+        python += grains * SPHERE_SECONDS
+        return Cost(pack_seconds=pack, invade_seconds=invade, analyse_seconds=python)
     duration, drag = expected_duration(case, scales), case.drag
     steps = math.ceil(duration / scales.time_step)
     feeding = scales.slab_length / scales.upstream_velocity
