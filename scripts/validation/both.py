@@ -18,6 +18,7 @@ from fdnet.run.pipeline import run_case
 CASE = Path(__file__).resolve().parents[2] / "cases" / "quick.toml"
 KEYS = (
     'box.size=["2.5 mm","1.5 mm","1.5 mm"]',
+    "grains.count=55",
     "analysis.sections=2",
     'fines.sizes={D10="75 um",D50="105 um",D90="145 um"}',
 )
