@@ -9,7 +9,7 @@ up, as in a stage that is not coupled; so a cut one goes on bit for bit.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -152,7 +152,7 @@ class ChunkedStage(ABC):
                 self.look_at(read_history(self.folder, self.points.kind), read_watch(self.folder))
                 if self.over(last):
                     return deck, runs
-            launch = replace(self.launch, follow=self.keeper())
+            launch = replace(self.launch, follow=self.follow)
             screen = self.folder / SCREEN
             screen.unlink(missing_ok=True)
             try:
@@ -172,22 +172,18 @@ class ChunkedStage(ABC):
             finally:
                 (self.folder / SCRATCH).unlink(missing_ok=True)
 
-    def keeper(self) -> Callable[[str], None]:
-        """What follows the screen and passes every line on.
+    def follow(self, line: str) -> None:
+        """Follow the screen and pass every line on.
 
         At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a
         run that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on
         after a failed write and ends with exit code 0. Older restarts are removed only while there
         is room on the disk.
         """
-
-        def follow(line: str) -> None:
-            if line.startswith(self.mark):
-                self._keep(int(line.split()[3]))
-            if self.launch.follow:
-                self.launch.follow(line)
-
-        return follow
+        if line.startswith(self.mark):
+            self._keep(int(line.split()[3]))
+        if self.launch.follow:
+            self.launch.follow(line)
 
     def _keep(self, step: int) -> None:
         if disk_is_full(self.folder):
@@ -331,16 +327,6 @@ class Invasion(EndedStage):
     last: InvasionScales
     overlap: Deepest
     updates: tuple[Mapping[str, float], ...]
-
-    @property
-    def damaged(self) -> Snapshot:
-        """Grains and remaining fines at the end, those upstream too."""
-        return self.state
-
-    @property
-    def max_overlap(self) -> float:
-        """Largest overlap of a fine with any sphere, over the smaller diameter."""
-        return self.overlap.fraction
 
 
 class InvadeStage(ChunkedStage):

@@ -93,7 +93,7 @@ class HandedUp:
     Attributes:
         run: that it comes from.
         rock, mud, cake, release: the model's; None where the specimen cannot tell.
-        closing: deposit at which the face closes; infinite where it was not seen to close.
+        closing: deposit at which the face closes, or that it had when the run ended.
         bins, deposit: (B+1,) m and (B,), the measured profile.
         fitted: (F,) deposit at F even depths of the specimen, by the fit.
         sections, kept: (S, 2) m and (S,), k / k0 of the sections in place.
@@ -202,8 +202,11 @@ def _of_run(run: FinishedRun, classes: int) -> list[HandedUp]:
         notes.append(f"only {found} fines entered before the face closed: all is cake")
         return [replace(made, notes=tuple(notes))]
     if not shut:
-        why = f"the run ended by {summary['stop_reason']} and not by a closed face"
-        notes.append(f"{why}: the deposit that closes it is not known, and no cake is built")
+        made = replace(made, cake=None)
+        notes.append(
+            f"the run ended by {summary['stop_reason']} and not by a closed face: what follows "
+            "when the face has this deposit is not known"
+        )
     fits = [fit_depths(depth[one], volume[one], through, length) for one in here]
     if (worst := max(fit.misfit for fit in fits)) > MISFIT:
         notes.append(f"the fitted depths differ from the measured by {worst:.0%} of the fines")
@@ -228,7 +231,7 @@ def _of_run(run: FinishedRun, classes: int) -> list[HandedUp]:
                 made,
                 rock=replace(rock, damage=harm),
                 mud=tuple(FineClass(*one) for one in mud),
-                closing=face if shut else math.inf,
+                closing=face,
                 fitted=fitted,
                 notes=tuple(notes),
             )

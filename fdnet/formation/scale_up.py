@@ -133,8 +133,8 @@ def core_flood(
     words.append(f"Its first {1e3 * taps[1]:.3g} mm keep {with_band(face, 'k_over_k0')}.")
     if face["return_k_over_k0"] is not None:
         words.append(
-            f"After a back-flow of {back_flow:g} pore volumes the core has "
-            f"{with_band(found, 'return_k_over_k0')} and the face {with_band(face, 'return_k_over_k0')}."
+            f"After a back-flow of {back_flow:g} pore volumes they are "
+            f"{with_band(found, 'return_k_over_k0')} and {with_band(face, 'return_k_over_k0')}."
         )
     return found | {"words": words}
 
@@ -180,6 +180,8 @@ def well_invasion(
         if case.well is not None:
             usual, outer = case.well.radius_m, case.well.drainage_radius_m
         well, over = radius or usual, pressure or case.fluid.overbalance_Pa
+        if well >= outer:
+            raise CaseError(f"radius: {well:g} m, expected below the drainage radius, {outer:g} m")
         if not over:
             raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
         drive = Drive(3600 * hours, over)
@@ -226,8 +228,8 @@ def well_invasion(
         f"It matters where the flow has less room: perforations that met this mud ({SHOTS:g} a "
         f"metre, {1e3 * SHOT_LENGTH:g} mm long, {1e3 * SHOT_RADIUS:g} mm radius) have a skin of "
         f"{with_band(shot, 'skin')} and lose {with_band(shot, 'flow_lost')}.",
-        f"In {found['time_s'] / 3600:.3g} h {with_band(found, 'filtrate_m3')} m3 of filtrate go in, "
-        f"to a radius of {with_band(found, 'invasion_radius_m')} m.",
+        f"In {found['time_s'] / 3600:.3g} h {with_band(found, 'filtrate_m3')} m3 of filtrate "
+        f"reach a radius of {with_band(found, 'invasion_radius_m')} m.",
     ]
     return found | {"words": words}
 
@@ -237,7 +239,7 @@ def keep(folder: Path, name: str, found: Mapping[str, Any], given: Mapping[str, 
     out, report = folder / FORMATION, folder / "report.html"
     with locked(folder):
         out.mkdir(exist_ok=True)
-        writewith_band(out / f"{name}.json", plain_json({"given": given, **found})[1] + "\n")
+        write_text(out / f"{name}.json", plain_json({"given": given, **found})[1] + "\n")
         draw_fit(hand_up(folder, classes=given.get("classes", 1)), out / "handed_up.svg")
         if report.is_file():
             put_section(report, FORMATION, formation_html(out))
@@ -260,8 +262,7 @@ def _around(
 
 def _steepest(handed: HandedUp) -> float:
     """Rate of filtration at the face when it closes, 1/m."""
-    deposit = handed.closing if math.isfinite(handed.closing) else 0.0
-    return max(one.rate * (1 + max(one.growth, 0.0) * deposit) for one in handed.mud)
+    return max(one.rate * (1 + max(one.growth, 0.0) * handed.closing) for one in handed.mud)
 
 
 def _marched(
@@ -283,8 +284,8 @@ def _marched(
 
 _STOPPED = {
     "": "",
-    "closed": "the face closed and the cake is not known: the numbers are those of that time; "
-    "give --cake-permeability or --api-filtrate",
+    "closed": "the numbers are those of the time when the face had the deposit of the run's end, "
+    "for no cake is known; give --cake-permeability or --api-filtrate",
     "full": "the cake of these fines alone fills the hole: the numbers are those of that time. "
     "A mud that has finer solids too holds back its filtrate; give --api-filtrate",
 }

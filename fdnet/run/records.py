@@ -376,10 +376,7 @@ class Session:
         return stage in self.options.stages and stage in self.case.stages
 
     def launch(self, progress: Progress) -> Launch:
-        """How a stage that begins now starts LIGGGHTS; the binary is looked for when first needed.
-
-        The time limit is that of the stage, however often LIGGGHTS is started in it.
-        """
+        """How a stage that begins now starts LIGGGHTS, within its time limit."""
         options = self.options
         if self._binary is None:
             self._binary = find_binary(options.liggghts, launcher=options.launcher)

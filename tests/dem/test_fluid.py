@@ -81,7 +81,7 @@ def with_case(fluid, *more, scales=None, **way):
 
 
 def deposit_of(done) -> Snapshot:
-    return replace(done.damaged.fines(), velocity=np.zeros((len(done.damaged.fines()), 3)))
+    return replace(done.state.fines(), velocity=np.zeros((len(done.state.fines()), 3)))
 
 
 def test_batches_come_as_the_mud_that_slows_down_carries_them(go, fluid, tmp_path):
@@ -330,7 +330,7 @@ def test_a_face_is_plugged_once_all_that_moves_has_come_to_rest(go, fluid, tmp_p
     assert result.stop_reason == "plugged"
     assert crossed[-1] == crossed[-1 - chunks]
     assert any(one == two for one, two in zip(entered, entered[chunks:-1], strict=False))
-    spheres = result.damaged.fines()
+    spheres = result.state.fines()
     inside = (spheres.position[:, 0] >= 0) & (spheres.position[:, 0] < other.case.size_m[0])
     mean = spheres.velocity[inside, 0].mean() / other.scales.interstitial_velocity
     assert 0 < mean <= 0.01
