@@ -190,8 +190,8 @@ def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Fin
             do="check the units of both sizes; if they are right, a shorter box is enough",
             read="docs/how-to/your_sand_and_your_mud.md",
         )
-    # the finest tenth of the spheres makes most of the time
-    if case.by_classes or not fines.measured or curve.low == curve.high:
+    # the finest tenth of the solids makes most of the time
+    if not fines.measured or curve.low == curve.high or case.by_classes:
         return
     cut = float(f"{1e6 * curve.size_at(FINE_SHARE):.2g}")
     data = case.data()

@@ -122,6 +122,7 @@ def diameter_at(curve: SizeCurve, share: float) -> float | None:
 
 def size_warnings(case: Case) -> Iterator[Doubt]:
     """What curves miss and what they leave out, and a sand denser than rigid spheres get."""
+    by_classes = isinstance(case, InvasionCase) and case.by_classes
     for name, spheres in curves_of(case).items():
         given = [] if spheres.sizes is None else [(f"{name}.sizes", spheres.sizes)]
         for number, one in enumerate(getattr(spheres, "materials", None) or ()):
@@ -147,7 +148,7 @@ def size_warnings(case: Case) -> Iterator[Doubt]:
             for share, side, size in ends
             if share > MOST_TAIL
         ]
-        if parts:
+        if parts and not (isinstance(spheres, Fines) and by_classes):
             thinner = ""
             if isinstance(spheres, Fines):
                 whole, placed = spheres.volume_fraction, spheres.placed_fraction

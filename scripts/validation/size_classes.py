@@ -52,6 +52,8 @@ def both(run: FinishedRun) -> dict[str, Any]:
     x = spheres_at_the_end(case, model, kept, counts).position[:, 0]
     edges = np.array([0.0, min(FIRST, case.size_m[0])])
     clean, flow = model.flow(np.ones_like(end.kept)).flow, end.state.flow
+    assert clean is not None
+    assert flow is not None
     intact = inplace_permeability(model.network, clean, edges, model.sieve.halves)
     damaged = inplace_permeability(model.network, flow, edges, model.sieve.halves / end.kept)
     passed, number = int(counts.passed.sum()), int(counts.invaded.sum())
