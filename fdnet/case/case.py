@@ -234,6 +234,12 @@ class InvasionCase(Case):
         return self.invasion is not None and self.invasion.method == "both"
 
     @property
+    def solids_fraction(self) -> float:
+        """Volume of the solids that invade, as spheres and classes, over that of the mud."""
+        fines = self.fines
+        return fines.volume_fraction if self.with_classes else fines.placed_fraction
+
+    @property
     def spheres(self) -> dict[str, Spheres]:
         """The kinds of sphere by the name of their material in a deck."""
         return {"grain": self.grains, "fine": self.fines}

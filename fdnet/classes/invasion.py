@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fdnet.case.case import InvasionCase
 from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient
 from fdnet.classes.deposit import (
     PACKED,
@@ -28,6 +29,7 @@ from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.network import Network
 from fdnet.scales.flow import carman_kozeny
+from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
 CHANGE = 0.05
@@ -111,6 +113,17 @@ class Course:
     supply: float
     sticking: float
     bed: Bed
+
+
+def bed_of(case: InvasionCase, scales: InvasionScales, velocity: float) -> Bed:
+    """The grains of a case as a bed, in a fluid of the superficial `velocity` m/s."""
+    return Bed(
+        diameter=case.grains.sauter_diameter_m,
+        porosity=scales.porosity,
+        velocity=velocity,
+        viscosity=case.fluid.viscosity_Pa_s,
+        density=case.fluid.density_kg_m3,
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -288,3 +301,14 @@ def api_filtrate(permeability: float, *, viscosity: float, solids: float) -> flo
 def api_permeability(filtrate: float, *, viscosity: float, solids: float) -> float:
     """Permeability, m2, of the cake that lets `filtrate` m3 through the API's press."""
     return (filtrate / api_filtrate(1.0, viscosity=viscosity, solids=solids)) ** 2
+
+
+def cake_permeability(case: InvasionCase) -> float | None:
+    """Permeability, m2, of the cake that the case gives, or its API filtrate; None without."""
+    if case.cake is None or case.cake.api_filtrate_m3 is None:
+        return None if case.cake is None else case.cake.permeability_m2
+    return api_permeability(
+        case.cake.api_filtrate_m3,
+        viscosity=case.fluid.viscosity_Pa_s,
+        solids=case.fines.volume_fraction,
+    )

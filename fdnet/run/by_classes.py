@@ -15,13 +15,14 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.case.tables import InvasionChoices
-from fdnet.classes.capture import Bed, SizeClasses, mud_classes
+from fdnet.classes.capture import SizeClasses, mud_classes
 from fdnet.classes.deposit import PACKED, Deposits, Sieve, sieve_of, thickness_of_cake
 from fdnet.classes.invasion import (
     Course,
     PackStateOf,
     api_filtrate,
-    api_permeability,
+    bed_of,
+    cake_permeability,
     cake_resistance,
     flows_through,
     invade_classes,
@@ -126,28 +127,6 @@ def _course(
         supply=solids,
         sticking=0.0 if case.invasion is None else case.invasion.sticking,
         bed=bed_of(case, scales, velocity),
-    )
-
-
-def bed_of(case: InvasionCase, scales: InvasionScales, velocity: float) -> Bed:
-    """The grains of a case as a bed, in a fluid of the superficial `velocity` m/s."""
-    return Bed(
-        diameter=case.grains.sauter_diameter_m,
-        porosity=scales.porosity,
-        velocity=velocity,
-        viscosity=case.fluid.viscosity_Pa_s,
-        density=case.fluid.density_kg_m3,
-    )
-
-
-def cake_permeability(case: InvasionCase) -> float | None:
-    """Permeability, m2, of the cake that the case gives, or its API filtrate; None without."""
-    if case.cake is None or case.cake.api_filtrate_m3 is None:
-        return None if case.cake is None else case.cake.permeability_m2
-    return api_permeability(
-        case.cake.api_filtrate_m3,
-        viscosity=case.fluid.viscosity_Pa_s,
-        solids=case.fines.volume_fraction,
     )
 
 

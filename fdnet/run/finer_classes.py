@@ -31,7 +31,7 @@ from fdnet.classes.deposit import (
     sieve_of,
     thickness_of_cake,
 )
-from fdnet.classes.invasion import cake_resistance
+from fdnet.classes.invasion import bed_of, cake_permeability, cake_resistance
 from fdnet.classes.transport import carry, streams_of
 from fdnet.files import replacing
 from fdnet.network.flow.flow import Flow
@@ -223,7 +223,7 @@ def without_last(classes: SizeClasses) -> SizeClasses:
 
 
 def finer_classes(
-    case: InvasionCase, scales: InvasionScales, pack: PackFlow, bed: Bed, cake: float | None
+    case: InvasionCase, scales: InvasionScales, pack: PackFlow
 ) -> FinerClasses | None:
     """What is finer than the cut of a case before its mud comes; None where nothing is."""
     choices, fines = case.invasion, case.fines
@@ -245,10 +245,10 @@ def finer_classes(
         pack=pack,
         sieve=sieve,
         classes=SizeClasses(**classes),
-        bed=bed,
+        bed=bed_of(case, scales, scales.darcy_velocity),
         sticking=choices.sticking,
         mud=scales.slab_length * sieve.area,
-        cake=cake,
+        cake=cake_permeability(case),
         solids=no_solids(sieve, finer),
         kept=np.ones(sieve.ends.shape),
         flux=np.zeros(0),

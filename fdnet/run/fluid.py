@@ -20,7 +20,6 @@ from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
-from fdnet.run.by_classes import bed_of, cake_permeability
 from fdnet.run.cake import Standing, standing_cake
 from fdnet.run.finer_classes import (
     CLASS_COLUMNS,
@@ -265,10 +264,7 @@ class NetworkFluid:
     def finer(self) -> FinerClasses | None:
         """The solids finer than the cut, from one update to the next; None without any."""
         case = self.case
-        if not case.with_classes:
-            return None
-        bed = bed_of(case, self.scales, self.first_velocity / self.scales.force_factor)
-        return finer_classes(case, self.scales, self.pack, bed, cake_permeability(case))
+        return finer_classes(case, self.scales, self.pack) if case.with_classes else None
 
     def keep(self, path: Path) -> None:
         """Write what the next update needs of the finer solids."""

@@ -20,7 +20,7 @@ from fdnet.classes.invasion import invade_classes
 from fdnet.files import path_option
 from fdnet.network.flow.sections import FIRST, inplace_permeability
 from fdnet.report.tables import write_rows
-from fdnet.run.by_classes import Kept, class_model, counted, spheres_at_the_end
+from fdnet.run.by_classes import Kept, class_model, spheres_at_the_end
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.scales.scales import invasion_scales
 
@@ -48,7 +48,7 @@ def both(run: FinishedRun) -> dict[str, Any]:
     end = invade_classes(model.sieve, model.classes, model.course, model.flow)
     seconds = time.process_time() - start
     kept = Kept(solids=end.solids, kept=end.kept, by_class=end.by_class, rows=())
-    counts = counted(model.classes, end.by_class[-1])
+    counts = model.counted(end.by_class[-1])
     x = spheres_at_the_end(case, model, kept, counts).position[:, 0]
     edges = np.array([0.0, min(FIRST, case.size_m[0])])
     clean, flow = model.flow(np.ones_like(end.kept)).flow, end.state.flow
