@@ -5,7 +5,8 @@
     .venv/bin/python scripts/validation.py list
 
 NAME runs a study, or goes on with it; `NAME --help` says what else it takes. Comparisons with
-commands of their own: accuracy, benchmark, truth, outside, mechanics, bridging, thesis.
+commands of their own: accuracy, benchmark, truth, outside, mechanics, bridging, classes,
+size-classes, thesis.
 """
 
 import sys
@@ -22,6 +23,8 @@ CHAPTERS: dict[str, str] = {
     "mechanics": "validation.mechanics",
     "scoreboard": "validation.scoreboard",
     "bridging": "validation.bridging",
+    "classes": "validation.classes",
+    "size-classes": "validation.size_classes",
     "thesis": "validation.thesis.command",
 }
 """Name and module of the comparisons with a command of their own, `main(arguments) -> int`.

@@ -229,6 +229,17 @@ class InvasionCase(Case):
         return self.invasion is not None and self.invasion.method == "network"
 
     @property
+    def with_classes(self) -> bool:
+        """Whether it carries what is finer than the cut, beside the spheres."""
+        return self.invasion is not None and self.invasion.method == "both"
+
+    @property
+    def solids_fraction(self) -> float:
+        """Volume of the solids that invade, as spheres and classes, over that of the mud."""
+        fines = self.fines
+        return fines.volume_fraction if self.with_classes else fines.placed_fraction
+
+    @property
     def spheres(self) -> dict[str, Spheres]:
         """The kinds of sphere by the name of their material in a deck."""
         return {"grain": self.grains, "fine": self.fines}
@@ -494,9 +505,9 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
         and not list(_some_throat(grains, fines))
     ):
         yield (
-            f"{size_text('fines', fines)} is not below {size_text('grains', grains)} "
-            "(the network needs a clear gap)"
-            + ("; narrow sizes.cut_percent of one" if fines.measured or grains.measured else "")
+            f"{size_text('fines', fines)}, expected below {size_text('grains', grains)}: "
+            "solids as large as the grains only lie in the cake"
+            + ("; leave them out by fines.sizes.cut_percent" if fines.measured else "")
         )
     if good("grains.radius_mm", "fines.radius_mm"):
         yield from _some_throat(grains, fines)
@@ -567,7 +578,7 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
 
     # the mud as size classes on the network
 
-    by_classes = given("invasion.method") and invasion.method == "network"
+    by_classes = given("invasion.method") and invasion.method != "liggghts"
     if given("cake.permeability_m2", "cake.api_filtrate_mL"):
         given_twice = cake.permeability_m2 is not None and cake.api_filtrate_mL is not None
         if given_twice:
@@ -577,18 +588,23 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
             )
         if not by_classes:
             yield (
-                "cake: the table belongs to invasion.method = 'network'; with spheres the cake "
-                "is that of the fines that LIGGGHTS moves; leave it out"
+                "cake: the table belongs to invasion.method = 'network' or 'both'; with spheres "
+                "alone the cake is that of the fines that LIGGGHTS moves; leave it out"
             )
     if by_classes and given("clean_up.drawdown_MPa"):
         yield (
-            "clean_up: with invasion.method = 'network' nothing turns the flow back; leave the "
-            "table out, or take 'liggghts'"
+            f"clean_up: with invasion.method = {invasion.method!r} nothing turns the flow back; "
+            "leave the table out, or take 'liggghts'"
         )
     if by_classes and good("grains.motion") and grains.motion == "mobile":
         yield (
-            "grains.motion: 'mobile' with invasion.method = 'network', whose pores are those of "
-            "grains that stay; take 'fixed'"
+            f"grains.motion: 'mobile' with invasion.method = {invasion.method!r}, whose pores are "
+            "those of grains that stay; take 'fixed'"
+        )
+    if by_classes and good("drag.field") and invasion.method == "both" and not drag.coupled:
+        yield (
+            f"drag.field: {drag.field!r} with invasion.method = 'both', whose spheres and classes "
+            "share one flow; leave it out, or take 'network'"
         )
 
     # the forces of the fluid

@@ -457,20 +457,21 @@ class CleanUp(Part):
 class InvasionChoices(Part):
     """[invasion], how the mud is let in: as spheres, or as size classes on the pore network.
 
-    The network takes all solids of the mud, also those below `fines.cut_um`.
+    With "network" these are all solids of the mud, also those below `fines.cut_um`.
     """
 
-    method: Literal["liggghts", "network"] = "liggghts"
+    method: Literal["liggghts", "network", "both"] = "liggghts"
     """"liggghts": every fine is a sphere. "network": the fast model, whose solids are
-    concentrations of size classes; `fdnet run --fast` asks for it."""
+    concentrations of size classes; `fdnet run --fast` asks for it. "both": spheres above
+    `fines.cut_um`, and what is finer as classes in the same flow."""
     classes: Annotated[int, Field(ge=1, le=40)] = 8
-    """Size classes of the mud, equal over the logarithm of the diameter."""
+    """Size classes, equal over the logarithm of the diameter."""
     sticking: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Share of the contacts of fines with grains that stick; 0 leaves attachment out."""
 
 
 class MudCake(Part):
-    """[cake], the measured cake of the mud, for invasion.method = "network".
+    """[cake], the measured cake of the mud, for invasion.method = "network" or "both".
 
     Clay and colloids make a mud's cake some million times tighter than its coarse solids do alone.
     """

@@ -63,34 +63,37 @@ class SizeClasses:
         return np.pi / 6.0 * self.diameter**3
 
 
-def mud_classes(fines: Fines, count: int) -> SizeClasses:
+def mud_classes(fines: Fines, count: int, *, below: float = math.inf) -> SizeClasses:
     """All solids of a mud in `count` classes, equal over ln d; one where all are of one size.
 
     What the case leaves out of the simulation with spheres is in them: `fines.cut_um` is passed
-    over, and the tails that `cut_percent` cuts off go to the first and the last class.
+    over, and the tails that `cut_percent` cuts off go to the first and the last class. Those finer
+    than `below` m alone where it is given, without a class where nothing is.
     """
     whole = type(fines).model_validate(fines.model_dump() | {"cut_um": None})
     parts = whole.components
-    low, high = min(one.curve.low for one in parts), max(one.curve.high for one in parts)
+    low, top = min(one.curve.low for one in parts), max(one.curve.high for one in parts)
+    high = max(low, min(top, below))
     edges = np.geomspace(low, high, count + 1) if high > low else np.array([low, high])
     edges[[0, -1]] = low, high
     volume, number, mass = (np.zeros(len(edges) - 1) for _ in range(3))
     for one in parts:
         shares = one.curve.kept * np.diff(one.curve.share_finer(edges)) if high > low else [1.0]
         shares = np.array(shares, float)
-        shares[[0, -1]] += np.array([one.curve.below, one.curve.above])
+        shares[0] += one.curve.below
+        shares[-1] += one.curve.above if high == top else 0.0
         volume += one.share * shares
         mass += one.share * shares * one.density
         by_number = np.diff(one.curve.share_finer(edges, 0)) if high > low else np.ones(1)
         number += one.share * by_number / one.curve.mean(3)
-    used = volume > 0
+    used = (volume > 0) & (high == top or high > low)
     middle = np.sqrt(edges[:-1] * edges[1:])
     size = np.cbrt(np.divide(volume, number, out=middle**3, where=number > 0))
     return SizeClasses(
         low=edges[:-1][used],
         high=edges[1:][used],
         diameter=np.clip(size, edges[:-1], edges[1:])[used],
-        concentration=(fines.volume_fraction * volume / volume.sum())[used],
+        concentration=(fines.volume_fraction * volume / sum(one.share for one in parts))[used],
         density=(mass[used] / volume[used]),
     )
 
@@ -107,18 +110,20 @@ def wider_share(classes: SizeClasses, passage: Array) -> Array:
     return np.clip((high - way) / width, 0.0, 1.0)
 
 
-BRIDGED = np.array(
-    [(0.0, 0.0), (0.2, 0.0), (0.29, 0.022), (0.45, 0.027), (0.57, 0.037), (0.9, 0.08), (1.0, 0.08)]
-)
-"""Chance per arrival that a throat stops a fine, by diameter over passage."""
+BRIDGED = ((0.65, 0.0), (0.725, 0.03), (0.9, 0.07))
+"""Chance per arrival that an empty throat stops a fine, by diameter over passage."""
 
 
 def bridging_chance(ratio: Array) -> Array:
-    """Chance per arrival that a throat stops a fine narrower than it; `ratio` is d over passage.
+    """Chance per arrival that an empty throat stops a fine narrower than it, by d over passage.
 
     0 from 1 on, where `wider_share` holds all.
     """
-    return np.where(ratio < 1.0, np.interp(ratio, *BRIDGED.T), 0.0)
+    return np.where(
+        ratio < 1.0,
+        np.interp(ratio, [one for one, _ in BRIDGED], [one for _, one in BRIDGED]),
+        0.0,
+    )
 
 
 # ------------------------------------------------------------------------------------------------

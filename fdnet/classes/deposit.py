@@ -7,6 +7,7 @@ pores of the face turn away.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,6 @@ from fdnet.classes.capture import (
 from fdnet.classes.transport import Streams, Swept
 from fdnet.network.flow.flow import PLANE_TOLERANCE
 from fdnet.network.network import Network
-from fdnet.scales.flow import carman_kozeny
 from fdnet.spheres.snapshot import Array, frozen, one_line
 
 PACKED = 0.40
@@ -38,6 +38,7 @@ class Sieve:
         halves: (T, 2) 1/m3, resistances of the sides of the clean throat.
         way: (T,) m, length of the throat over the tortuosity.
         void: (N,) m3 inside the box.
+        room: (N,) m, cubic root of the mean void of the tetrahedra that make up a pore.
         surface: (N,) m2 of grains.
         place: (N, 3) m.
         throat_place: (T, 3) m.
@@ -53,6 +54,7 @@ class Sieve:
     halves: Array
     way: Array
     void: Array
+    room: Array
     surface: Array
     place: Array
     throat_place: Array
@@ -74,6 +76,7 @@ def sieve_of(network: Network, halves: Array, flux: Array) -> Sieve:
     two = network.throat_ends
     along = (two[:, 1, 0] - two[:, 0, 0]) * flux
     winding = float(np.sum(network.throat_length * np.abs(flux))) / max(float(along.sum()), 1e-300)
+    whole = np.maximum(network.pore_volume, 0.0)
     middle = network.throat_corner.mean(axis=1)
     middle[:, 1:] = (middle[:, 1:] - network.box[1:, 0]) % size[1:] + network.box[1:, 0]
     return Sieve(
@@ -82,7 +85,8 @@ def sieve_of(network: Network, halves: Array, flux: Array) -> Sieve:
         opening=frozen(np.maximum(network.throat_radius_effective, network.throat_radius)),
         halves=frozen(np.where(np.isfinite(halves), halves, 0.0)),
         way=frozen(network.throat_length / max(winding, 1.0)),
-        void=frozen(np.bincount(group, np.maximum(network.pore_volume, 0.0) * network.pore_share)),
+        void=frozen(np.bincount(group, whole * network.pore_share)),
+        room=frozen(np.cbrt(np.bincount(group, whole) / np.bincount(group))),
         surface=frozen(np.bincount(group, network.pore_wall_surface * network.pore_share, count)),
         place=frozen(place),
         throat_place=frozen(middle),
@@ -153,17 +157,16 @@ def no_solids(sieve: Sieve, classes: SizeClasses) -> Deposits:
 # What the deposit leaves of passages, pores and conductances.
 
 
-WEDGE_LEAVES = 0.35
-"""Passage beside a fine in a throat over that of the clean throat."""
-WEDGE_KEEPS = 1.0
-"""Share of its conductance that a throat keeps with one fine in it."""
-WEDGES = 1.3
-"""A fine up to so many passages wide sits in the throat that holds it, a wider one before it."""
-LOOSE = 0.33
+LOOSE = 0.29
 """Share by which solids in a pore pack less densely, for each of their diameters over the cubic
-root of its void."""
+root of its void: 0.55 of the void at 0.35, 0.42 at 0.9, 0.38 at 1.2 (docs/theory/size_classes)."""
 FULL = 0.95
 """Filled share from which a pore begins to act as a bed."""
+ADDED, BED = 1210.0, 855.0
+"""Resistance that a deposit adds to a side of a throat, times (d l)^1.5 and d^2 l, over the square
+of the share of the void that it takes: measured for large fines, and Carman and Kozeny's bed."""
+WEDGES = 1.3
+"""A fine up to so many passages wide sits in the throat that holds it, a wider one before it."""
 
 
 def wedged(solids: Deposits, classes: SizeClasses) -> Array:
@@ -171,23 +174,37 @@ def wedged(solids: Deposits, classes: SizeClasses) -> Array:
     return np.minimum(solids.in_throats @ (1.0 / classes.volume), 1.0)
 
 
-def pore_capacity(sieve: Sieve, solids: Deposits, classes: SizeClasses) -> Array:
-    """Deposits (N,) m3 that fill each pore: packed less densely where they are as large as it."""
-    size = np.cbrt(np.maximum(sieve.void, 1e-30))
-    wide = bed_diameter(solids.in_pores + solids.attached, classes) / size
-    return sieve.void * (1.0 - PACKED) * np.maximum(1.0 - LOOSE * wide, 0.25)
+class Loads(NamedTuple):
+    """What the deposit takes of pores (N)."""
+
+    share: Array
+    """(N,) of the void."""
+    filled: Array
+    """(N,) over the share of a full pore."""
+    diameter: Array
+    """(N,) m, Sauter mean; 0 where there is none."""
 
 
-def filled_share(sieve: Sieve, solids: Deposits, classes: SizeClasses) -> Array:
-    """Deposits (N,) of each pore over its capacity; fines in throats count half for each side."""
-    capacity = pore_capacity(sieve, solids, classes)
-    half = 0.5 * solids.in_throats.sum(axis=1)
-    count = len(sieve.void)
-    beside = np.bincount(sieve.ends[:, 0], half, count) + np.bincount(
-        sieve.ends[:, 1], half, count
-    )
-    held = solids.in_pores.sum(axis=1) + solids.attached.sum(axis=1) + beside
-    return np.divide(held, capacity, out=np.zeros(count), where=capacity > 0)
+def loads_of(
+    sieve: Sieve, solids: Deposits, classes: SizeClasses, *, with_attached: bool = False
+) -> Loads:
+    """The loads of the pores; a fine in a throat counts half for each side.
+
+    What sticks to the grains is no pile that stops others, but narrows the pore all the same.
+    """
+    count, half = len(sieve.void), 0.5 * solids.in_throats
+    held = solids.in_pores + solids.attached if with_attached else solids.in_pores
+    held = held + sum(_gathered(ends, half, count) for ends in sieve.ends.T)
+    size = bed_diameter(held, classes)
+    share = np.divide(held.sum(axis=1), sieve.void, out=np.zeros(count), where=sieve.void > 0)
+    wide = np.divide(size, sieve.room, out=np.zeros(count), where=sieve.room > 0)
+    full = (1.0 - PACKED) * np.maximum(1.0 - LOOSE * wide, 0.25)
+    return Loads(share=share, filled=share / full, diameter=size)
+
+
+def _gathered(where: Array, values: Array, count: int) -> Array:
+    """Sums (count, C) of rows (K, C) that belong to the same of `count` pores."""
+    return np.stack([np.bincount(where, one, count) for one in values.T], axis=1)
 
 
 def bed_diameter(deposit: Array, classes: SizeClasses) -> Array:
@@ -199,26 +216,22 @@ def bed_diameter(deposit: Array, classes: SizeClasses) -> Array:
 def kept_shares(sieve: Sieve, solids: Deposits, classes: SizeClasses) -> Array:
     """Share (T, 2) of its clean conductance that each side of a throat keeps.
 
-    Along a pore that is filled to the share s the conductance falls to the share of a full one to
-    the power s; a full one is a bed of Carman and Kozeny's permeability k in the open area of the
-    throat, of the radius r: 8 k / r^2.
+    Solids of the diameter d that take the share s of a pore of the size l add to each side
+
+        dR = s^2 max(A / (d l)^1.5, B / (d^2 l)).
     """
-    fill = np.minimum(filled_share(sieve, solids, classes), 1.0)
-    size = bed_diameter(solids.in_pores + solids.attached, classes)
-    permeability = carman_kozeny(PACKED, 1.0) * size**2
-    kept = np.ones(sieve.ends.shape)
-    wedge = 1.0 - wedged(solids, classes) * (1.0 - WEDGE_KEEPS)
-    for side in (0, 1):
-        pore = sieve.ends[:, side]
-        bed = np.minimum(8.0 * permeability[pore] / np.maximum(sieve.opening, 1e-12) ** 2, 1.0)
-        bed = np.where(bed > 0, bed, 1.0)
-        kept[:, side] = wedge * bed ** fill[pore]
-    return kept
+    loads = loads_of(sieve, solids, classes, with_attached=True)
+    size, room = np.maximum(loads.diameter, 1e-12), np.maximum(sieve.room, 1e-9)
+    share = np.minimum(loads.share, 1.0 - PACKED)
+    added = np.maximum(ADDED / (size * room) ** 1.5, BED / (size**2 * room)) * share**2
+    added = np.where(loads.diameter > 0, added, 0.0)
+    raised = sieve.halves + added[sieve.ends]
+    return np.divide(sieve.halves, raised, out=np.ones_like(raised), where=sieve.halves > 0)
 
 
-def bed_holds(deposit: Array, classes: SizeClasses) -> Array:
-    """Share (N, C) of each class that beds of the solids `deposit` (N, C) m3 hold."""
-    return wider_share(classes, TIGHT * bed_diameter(deposit, classes))
+def bed_holds(size: Array, classes: SizeClasses) -> Array:
+    """Share (N, C) of each class that beds of the Sauter diameter `size` (N,) m hold."""
+    return np.where(size[:, None] > 0, wider_share(classes, TIGHT * size), 0.0)
 
 
 def full_share(fill: Array) -> Array:
@@ -228,6 +241,11 @@ def full_share(fill: Array) -> Array:
 
 # ------------------------------------------------------------------------------------------------
 # What each link holds back, and where that goes.
+
+
+LOADED = (0.06, 1.6, 0.33)
+"""Chance per arrival that a deposit beside a throat stops a fine: a + b s, at most c, of the share
+s that it takes of the two pores."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -251,34 +269,36 @@ def holding(
     sieve: Sieve, solids: Deposits, classes: SizeClasses, streams: Streams, filtering: Array
 ) -> Holding:
     """What holds back what, with the deposit as it is; `filtering` (C,) 1/m is of clean grains."""
-    fill, wedge = filled_share(sieve, solids, classes), wedged(solids, classes)
-    bed = solids.in_pores + solids.attached
-    full = full_share(fill)[:, None] * bed_holds(bed, classes)
-    throat = streams.link
+    loads, throat = loads_of(sieve, solids, classes), streams.link
+    holds = bed_holds(loads.diameter, classes)
+    full = full_share(loads.filled)[:, None] * holds
+    one, other = streams.source, streams.target
+    void = np.maximum(sieve.void, 1e-30)
+    near = (loads.share * void)[one] + (loads.share * void)[other]
+    near /= void[one] + void[other]
+    start, slope, most = LOADED
+    chance = np.where(near > 0, np.minimum(start * (near > NONE) + slope * near, most), 0.0)
+    beside = chance[:, None] * np.maximum(holds[one], holds[other])
     clean = np.maximum(sieve.passage[throat], 1e-12)
-    free = _passing(classes, clean, 1.0)
-    beside = _passing(classes, clean, WEDGE_LEAVES)
-    share = wedge[throat][:, None]
-    passing = ((1.0 - share) * free + share * beside) * (1.0 - full[streams.target])
+    bridged = bridging_chance(classes.diameter / clean[:, None])
+    passing = (1.0 - wider_share(classes, clean)) * (1.0 - bridged) * (1.0 - beside)
+    passing *= 1.0 - full[other]
     stuck = np.zeros_like(passing)
     if np.any(filtering > 0):
-        bare = 1.0 - covered(solids.attached, classes, sieve.surface)[streams.source]
+        bare = 1.0 - covered(solids.attached, classes, sieve.surface)[one]
         stuck = -np.expm1(-filtering * (sieve.way[throat] * bare)[:, None])
     held = 1.0 - (1.0 - stuck) * passing
     return Holding(held=held, stuck=stuck, admitted=_admitted(sieve, solids, classes, full))
 
 
-def _passing(classes: SizeClasses, passage: Array, left: float) -> Array:
-    """Share (K, C) of classes that neither strains nor bridges in `left` of passages (K,) m."""
-    narrow = left * passage
-    bridged = bridging_chance(classes.diameter / narrow[:, None])
-    return (1.0 - wider_share(classes, narrow)) * (1.0 - bridged)
+NONE = 1e-3
+"""Share of two pores below which a deposit stops nothing: less than a fine in hundreds of them."""
 
 
 def _admitted(sieve: Sieve, solids: Deposits, classes: SizeClasses, full: Array) -> Array:
     covers = min(1.0, cake_layers(sieve, solids, classes))
-    through = 1.0 - covers * bed_holds(solids.cake[None], classes)
-    return (1.0 - full) * through
+    size = bed_diameter(solids.cake[None], classes)
+    return (1.0 - full) * (1.0 - covers * bed_holds(size, classes))
 
 
 def cake_layers(sieve: Sieve, solids: Deposits, classes: SizeClasses) -> float:

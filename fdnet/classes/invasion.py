@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fdnet.case.case import InvasionCase
 from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient
 from fdnet.classes.deposit import (
     PACKED,
@@ -28,6 +29,7 @@ from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.network import Network
 from fdnet.scales.flow import carman_kozeny
+from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
 CHANGE = 0.05
@@ -113,6 +115,17 @@ class Course:
     bed: Bed
 
 
+def bed_of(case: InvasionCase, scales: InvasionScales, velocity: float) -> Bed:
+    """The grains of a case as a bed, in a fluid of the superficial `velocity` m/s."""
+    return Bed(
+        diameter=case.grains.sauter_diameter_m,
+        porosity=scales.porosity,
+        velocity=velocity,
+        viscosity=case.fluid.viscosity_Pa_s,
+        density=case.fluid.density_kg_m3,
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ClassInvasion:
     """The end of an invasion and its history.
@@ -147,14 +160,15 @@ def velocity_in(course: Course, k_over_k0: float, cake: float) -> float:
     return course.velocity * (1.0 + course.rest) / resistance
 
 
-def cake_resistance(course: Course, sieve: Sieve, solids: Deposits, classes: SizeClasses) -> float:
-    """1/m, of the cake: its thickness over its permeability."""
+def cake_resistance(
+    given: float | None, sieve: Sieve, solids: Deposits, classes: SizeClasses
+) -> float:
+    """1/m, of the cake: its thickness over its permeability, `given` in m2 or that of its bed."""
     thickness = thickness_of_cake(sieve, solids)
     if thickness <= 0:
         return 0.0
     size = float(bed_diameter(solids.cake, classes))
-    permeability = course.cake_permeability or carman_kozeny(PACKED, size)
-    return thickness / permeability
+    return thickness / (given or carman_kozeny(PACKED, size))
 
 
 def invade_classes(
@@ -166,7 +180,7 @@ def invade_classes(
     wanted, quiet, reason, mud = FIRST_STEP * pores, 0.0, "", float(classes.concentration.sum())
     state = flow_with(kept)
     for _ in range(MOST_STEPS):
-        cake = cake_resistance(course, sieve, solids, classes)
+        cake = cake_resistance(course.cake_permeability, sieve, solids, classes)
         velocity = velocity_in(course, state.k_over_k0, cake)
         rows.append(_row(course, sieve, solids, time, filtrate, velocity, state.k_over_k0, cake))
         by_class.append([solids.inside_by_class, solids.passed, solids.cake])
@@ -287,3 +301,14 @@ def api_filtrate(permeability: float, *, viscosity: float, solids: float) -> flo
 def api_permeability(filtrate: float, *, viscosity: float, solids: float) -> float:
     """Permeability, m2, of the cake that lets `filtrate` m3 through the API's press."""
     return (filtrate / api_filtrate(1.0, viscosity=viscosity, solids=solids)) ** 2
+
+
+def cake_permeability(case: InvasionCase) -> float | None:
+    """Permeability, m2, of the cake that the case gives, or its API filtrate; None without."""
+    if case.cake is None or case.cake.api_filtrate_m3 is None:
+        return None if case.cake is None else case.cake.permeability_m2
+    return api_permeability(
+        case.cake.api_filtrate_m3,
+        viscosity=case.fluid.viscosity_Pa_s,
+        solids=case.fines.volume_fraction,
+    )

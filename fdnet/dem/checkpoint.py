@@ -35,7 +35,7 @@ from fdnet.spheres.snapshot import Snapshot
 HISTORY, UPDATES, WATCH = "history.csv", "updates.csv", "overlap.csv"
 DOUBTS = "doubts.txt"
 """Warnings of the sessions that went on from an earlier checkpoint than they could."""
-_SUFFIXES = "dump|restart|unreadable|record"
+_SUFFIXES = "dump|restart|npz|unreadable|record"
 
 
 class Checkpoint(NamedTuple):
@@ -95,6 +95,7 @@ class Record(NamedTuple):
         dump: the dump.
         restart: the restart.
         updates: the updates of a coupled stage before the checkpoint.
+        fluid: what the fluid of a coupled stage remembers; "" where that is nothing.
         fdnet: version of fdnet, whose forces these are; "" by a version that did not record it.
     """
 
@@ -105,6 +106,7 @@ class Record(NamedTuple):
     dump: str
     restart: str
     updates: str
+    fluid: str = ""
     fdnet: str = ""
 
 
@@ -163,9 +165,10 @@ class Checkpoints:
         self.store(row.step, record)
 
     def remove_restarts(self, step: int) -> None:
-        """Remove the restarts before `step`, but for the two newest."""
-        for _, old in [one for one in self.files("restart") if one[0] <= step][:-2]:
-            old.unlink(missing_ok=True)
+        """Remove the restarts before `step`, but for the two newest, and what goes with them."""
+        for suffix in ("restart", "npz"):
+            for _, old in [one for one in self.files(suffix) if one[0] <= step][:-2]:
+                old.unlink(missing_ok=True)
 
     def _digests(self, step: int) -> dict[str, str]:
         """Digests of the files of a checkpoint. Raises OSError where one cannot be read."""
@@ -174,6 +177,8 @@ class Checkpoints:
         except (LiggghtsError, KeyError):
             updates = [{"unreadable": 0.0}]
         files = {name: file_digest(self.path(step, name)) for name in ("dump", "restart")}
+        memory = self.path(step, "npz")
+        files["fluid"] = file_digest(memory) if memory.exists() else ""
         return files | {"updates": rows_digest([sorted(row.items()) for row in updates])}
 
     def last(self) -> Any | None:
@@ -206,11 +211,11 @@ class Checkpoints:
             usable.append((row, record))
         return next((row for row, record in reversed(usable) if self._is_whole(row, record)), None)
 
-    def has_its_dump(self, step: int) -> bool:
-        """Whether the dump of a checkpoint is as it was recorded."""
+    def holds(self, step: int, suffix: str) -> bool:
+        """Whether the "dump" or "restart" of a checkpoint is as it was recorded."""
         record = self.record(step)
         try:
-            return record is not None and file_digest(self.path(step, "dump")) == record.dump
+            return file_digest(self.path(step, suffix)) == getattr(record, suffix, None)
         except OSError:
             return False
 
@@ -636,31 +641,6 @@ def cut_watch(folder: Path, last_step: int) -> None:
     if (folder / WATCH).exists():
         rows = [row for row in read_watch(folder) if row.step <= last_step]
         write_text(folder / WATCH, "".join(f"{row.step},{row.fraction!r}\n" for row in rows))
-
-
-class WatchReader:
-    """Reads what is new in overlap.csv, at each checkpoint of a run.
-
-    It begins at the end of the file, which holds what earlier sessions measured.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.path = folder / WATCH
-        self.waiting: list[Deepest] = []
-        self.offset = self.path.stat().st_size if self.path.exists() else 0
-
-    def upto(self, step: int) -> list[Deepest]:
-        """The new rows up to `step`; later ones are kept for the next checkpoint."""
-        if self.path.exists():
-            with self.path.open("rb") as file:
-                file.seek(self.offset)
-                text = file.read()
-            whole = text[: text.rfind(b"\n") + 1]
-            self.offset += len(whole)
-            self.waiting += _watched(whole.decode(errors="replace").splitlines())
-        rows = [row for row in self.waiting if row.step <= step]
-        self.waiting = [row for row in self.waiting if row.step > step]
-        return rows
 
 
 def overlap_in(case: Case, state: Snapshot) -> Deepest:

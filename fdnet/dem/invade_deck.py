@@ -118,6 +118,12 @@ class DrivingFluid(Protocol):
     def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
         """What acts on the fines of `spheres`, in their order."""
 
+    def keep(self, path: Path) -> None:
+        """Write what the next answer needs and spheres and rows do not say, if there is any."""
+
+    def recall(self, path: Path | None) -> None:
+        """Read it back; begin anew without a path."""
+
 
 SHOWN_COLUMNS = " ".join((COLUMNS, "density", *GIVEN))
 """Columns of the state that LIGGGHTS shows."""

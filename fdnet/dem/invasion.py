@@ -9,7 +9,7 @@ up, as in a stage that is not coupled; so a cut one goes on bit for bit.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -25,7 +25,6 @@ from fdnet.dem.checkpoint import (
     Checkpoints,
     Deepest,
     Updates,
-    WatchReader,
     chunks_of,
     deepest_of,
     entered_by,
@@ -153,7 +152,7 @@ class ChunkedStage(ABC):
                 self.look_at(read_history(self.folder, self.points.kind), read_watch(self.folder))
                 if self.over(last):
                     return deck, runs
-            launch = replace(self.launch, follow=self.keeper())
+            launch = replace(self.launch, follow=self.follow)
             screen = self.folder / SCREEN
             screen.unlink(missing_ok=True)
             try:
@@ -173,32 +172,29 @@ class ChunkedStage(ABC):
             finally:
                 (self.folder / SCRATCH).unlink(missing_ok=True)
 
-    def keeper(self) -> Callable[[str], None]:
-        """What follows the screen and passes every line on.
+    def follow(self, line: str) -> None:
+        """Follow the screen and pass every line on.
 
         At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a
         run that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on
         after a failed write and ends with exit code 0. Older restarts are removed only while there
         is room on the disk.
         """
-        watch = WatchReader(self.folder)
+        if line.startswith(self.mark):
+            self._keep(int(line.split()[3]))
+        if self.launch.follow:
+            self.launch.follow(line)
 
-        def follow(line: str) -> None:
-            if line.startswith(self.mark):
-                self._keep(int(line.split()[3]), watch)
-            if self.launch.follow:
-                self.launch.follow(line)
-
-        return follow
-
-    def _keep(self, step: int, watch: WatchReader) -> None:
+    def _keep(self, step: int) -> None:
         if disk_is_full(self.folder):
             raise LiggghtsError(
                 f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
                 "continue with --resume"
             )
-        rows = [row for row in read_rows(self.folder, self.points.kind) if row.step == step][-1:]
-        overlaps = watch.upto(step)
+        past = [row for row in read_rows(self.folder, self.points.kind) if row.step <= step]
+        rows = [row for row in past if row.step == step][-1:]
+        since = max((row.step for row in past if row.step < step), default=-1)
+        overlaps = [one for one in read_watch(self.folder) if since < one.step <= step]
         for row in rows:
             self.points.keep(row, ranks=self.launch.ranks, overlaps=overlaps)
         if not rows and self.points.stage == "invade" and self.case.run.on_overlap == "stop":
@@ -217,6 +213,7 @@ class ChunkedStage(ABC):
         assert self.fluid is not None
         updates = Updates(self.folder, self.fluid.measured, upto=last.step if last else 0)
         step, pace = last.step if last else self.first_step, self.pace(last)
+        self.fluid.recall(self.points.path(step, "npz") if last else None)
         feed(f"include {name}")
         while last is None or not self.over(last):
             if self.pace(last) != pace:
@@ -227,6 +224,7 @@ class ChunkedStage(ABC):
                 steps = self._update(feed, updates, last, pace, end - step)
                 feed(f"run {steps}" + ("" if fresh else " pre no post no"))
                 step, fresh = step + steps, False
+            self.fluid.keep(self.points.path(step, "npz"))
             feed("include checkpoint.in")
             last = read_history(self.folder, self.points.kind)[-1]
 
@@ -247,14 +245,13 @@ class ChunkedStage(ABC):
         time = self.time_at(last, done * self.scales.checkpoint_steps / pace.checkpoint_steps)
         frame, dt = self.shown(feed), pace.time_step
         spheres, density = self.spheres(frame, time), fine_density(frame)
-        shows = GIVEN[0] in frame.columns
         moment = Moment(
             step=step,
             time=time,
             before=updates.last,
             fresh=done == 0,
             left=left * dt,
-            given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0) if shows else None,
+            given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0),
             density=density,
         )
         assert self.fluid is not None
@@ -331,16 +328,6 @@ class Invasion(EndedStage):
     overlap: Deepest
     updates: tuple[Mapping[str, float], ...]
 
-    @property
-    def damaged(self) -> Snapshot:
-        """Grains and remaining fines at the end, those upstream too."""
-        return self.state
-
-    @property
-    def max_overlap(self) -> float:
-        """Largest overlap of a fine with any sphere, over the smaller diameter."""
-        return self.overlap.fraction
-
 
 class InvadeStage(ChunkedStage):
     """An invasion as it is run."""
@@ -384,7 +371,7 @@ class InvadeStage(ChunkedStage):
         def lasting(first: int, row: Checkpoint) -> float:
             seen = [one.fraction for one in watched if first < one.step <= row.step]
             if not seen:
-                if row is not last and not self.points.has_its_dump(row.step):
+                if row is not last and not self.points.holds(row.step, "dump"):
                     raise LiggghtsError(
                         f"{self.points.path(row.step, 'dump')}: is missing, or not as it was "
                         "recorded, and the springs of the next chunk follow from it; put it back, "

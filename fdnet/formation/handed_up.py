@@ -20,14 +20,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
-from fdnet.campaign.api import open_runs
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
 from fdnet.files import expanded
 from fdnet.formation.model import CakeOf, FineClass, Release, Rock
 from fdnet.report.figures import BLUE, DEPTH_LABEL, GREY, MM, draw, stairs
 from fdnet.run.finished import FinishedRun, open_run
-from fdnet.run.folder import is_run_folder
+from fdnet.run.folder import MANIFEST, is_run_folder
 from fdnet.spheres.snapshot import Array
 
 FEWEST, LEAST_LOSS, MISFIT, DRAWS, PLACES = 30, 0.02, 0.1, 24, 800
@@ -93,7 +92,7 @@ class HandedUp:
     Attributes:
         run: that it comes from.
         rock, mud, cake, release: the model's; None where the specimen cannot tell.
-        closing: deposit at which the face closes; infinite where it was not seen to close.
+        closing: deposit at which the face closes, or that it had when the run ended.
         bins, deposit: (B+1,) m and (B,), the measured profile.
         fitted: (F,) deposit at F even depths of the specimen, by the fit.
         sections, kept: (S, 2) m and (S,), k / k0 of the sections in place.
@@ -149,15 +148,16 @@ def hand_up(source: str | Path | FinishedRun, *, classes: int = 1) -> list[Hande
     folder = expanded(source)
     if is_run_folder(folder) or not folder.is_dir():
         return _of_run(open_run(folder), classes)
-    comparison = open_runs(folder).comparison
-    if not comparison.done:
-        raise CaseError(f"{folder}: no run of it is finished; run it first")
-    if len(comparison.variants) > 1:
+    done = [one.parent for one in sorted((folder / "runs").glob(f"*/{MANIFEST}"))]
+    if not done:
+        raise CaseError(f"{folder}: holds no finished run; give a run folder or an ensemble")
+    runs = [open_run(one) for one in done]
+    cases = [{**one.case.data(), "seed": 0} for one in runs]
+    if any(case != cases[0] for case in cases):
         raise CaseError(
-            f"{folder}: holds {len(comparison.variants)} variants, expected runs of one case that "
-            "differ by the seed; give the folder of one run or of an ensemble"
+            f"{folder}: its runs differ by more than the seed; give one of them, or an ensemble"
         )
-    return [_of_run(open_run(one.folder), classes)[0] for one in comparison.done]
+    return [_of_run(run, classes)[0] for run in runs]
 
 
 def _of_run(run: FinishedRun, classes: int) -> list[HandedUp]:
@@ -202,8 +202,11 @@ def _of_run(run: FinishedRun, classes: int) -> list[HandedUp]:
         notes.append(f"only {found} fines entered before the face closed: all is cake")
         return [replace(made, notes=tuple(notes))]
     if not shut:
-        why = f"the run ended by {summary['stop_reason']} and not by a closed face"
-        notes.append(f"{why}: the deposit that closes it is not known, and no cake is built")
+        made = replace(made, cake=None)
+        notes.append(
+            f"the run ended by {summary['stop_reason']} and not by a closed face: what follows "
+            "when the face has this deposit is not known"
+        )
     fits = [fit_depths(depth[one], volume[one], through, length) for one in here]
     if (worst := max(fit.misfit for fit in fits)) > MISFIT:
         notes.append(f"the fitted depths differ from the measured by {worst:.0%} of the fines")
@@ -228,7 +231,7 @@ def _of_run(run: FinishedRun, classes: int) -> list[HandedUp]:
                 made,
                 rock=replace(rock, damage=harm),
                 mud=tuple(FineClass(*one) for one in mud),
-                closing=face if shut else math.inf,
+                closing=face,
                 fitted=fitted,
                 notes=tuple(notes),
             )

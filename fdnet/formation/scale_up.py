@@ -15,7 +15,7 @@ from fdnet.formation.model import (
     NO_RELEASE,
     CakeOf,
     Column,
-    Drive,
+    Flood,
     March,
     cake_skin,
     damage_skin,
@@ -82,7 +82,7 @@ def core_flood(
     _above_zero(length=length, diameter=diameter, minutes=minutes, sections=sections)
     _above_zero(rate=rate, pressure=pressure, back_flow=back_flow)
     area, taps = math.pi * diameter**2 / 4, np.linspace(0.0, length, sections + 1)
-    drive = Drive(60 * minutes, pressure or math.nan, rate)
+    drive = Flood(60 * minutes, pressure or math.nan, rate)
 
     def flooded(handed: HandedUp) -> dict[str, Any]:
         first = 0.01 / (_steepest(handed) + 1 / length)
@@ -93,7 +93,7 @@ def core_flood(
             flow = abs(float(made.rate[0]))
             seconds = back_flow * handed.rock.porosity * area * length / flow
             forth = drive._replace(seconds=float(made.time[-1]))
-            back = _marched(handed, column, [forth, Drive(seconds, rate=-flow)], taps).k_over_k0[
+            back = _marched(handed, column, [forth, Flood(seconds, rate=-flow)], taps).k_over_k0[
                 -1
             ]
         solids = sum(one.concentration for one in handed.mud)
@@ -133,8 +133,8 @@ def core_flood(
     words.append(f"Its first {1e3 * taps[1]:.3g} mm keep {with_band(face, 'k_over_k0')}.")
     if face["return_k_over_k0"] is not None:
         words.append(
-            f"After a back-flow of {back_flow:g} pore volumes the core has "
-            f"{with_band(found, 'return_k_over_k0')} and the face {with_band(face, 'return_k_over_k0')}."
+            f"After a back-flow of {back_flow:g} pore volumes they are "
+            f"{with_band(found, 'return_k_over_k0')} and {with_band(face, 'return_k_over_k0')}."
         )
     return found | {"words": words}
 
@@ -180,9 +180,11 @@ def well_invasion(
         if case.well is not None:
             usual, outer = case.well.radius_m, case.well.drainage_radius_m
         well, over = radius or usual, pressure or case.fluid.overbalance_Pa
+        if well >= outer:
+            raise CaseError(f"radius: {well:g} m, expected below the drainage radius, {outer:g} m")
         if not over:
             raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
-        drive = Drive(3600 * hours, over)
+        drive = Flood(3600 * hours, over)
         hole, made = _around(handed, well, height, outer, drive)
         shots = SHOTS * SHOT_LENGTH
         shot, pierced = _around(handed, SHOT_RADIUS, height * shots, outer, drive)
@@ -226,8 +228,8 @@ def well_invasion(
         f"It matters where the flow has less room: perforations that met this mud ({SHOTS:g} a "
         f"metre, {1e3 * SHOT_LENGTH:g} mm long, {1e3 * SHOT_RADIUS:g} mm radius) have a skin of "
         f"{with_band(shot, 'skin')} and lose {with_band(shot, 'flow_lost')}.",
-        f"In {found['time_s'] / 3600:.3g} h {with_band(found, 'filtrate_m3')} m3 of filtrate go in, "
-        f"to a radius of {with_band(found, 'invasion_radius_m')} m.",
+        f"In {found['time_s'] / 3600:.3g} h {with_band(found, 'filtrate_m3')} m3 of filtrate "
+        f"reach a radius of {with_band(found, 'invasion_radius_m')} m.",
     ]
     return found | {"words": words}
 
@@ -237,14 +239,14 @@ def keep(folder: Path, name: str, found: Mapping[str, Any], given: Mapping[str, 
     out, report = folder / FORMATION, folder / "report.html"
     with locked(folder):
         out.mkdir(exist_ok=True)
-        writewith_band(out / f"{name}.json", plain_json({"given": given, **found})[1] + "\n")
+        write_text(out / f"{name}.json", plain_json({"given": given, **found})[1] + "\n")
         draw_fit(hand_up(folder, classes=given.get("classes", 1)), out / "handed_up.svg")
         if report.is_file():
             put_section(report, FORMATION, formation_html(out))
 
 
 def _around(
-    handed: HandedUp, well: float, height: float, outer: float, drive: Drive
+    handed: HandedUp, well: float, height: float, outer: float, drive: Flood
 ) -> tuple[Column, March]:
     """The rock around a hole of radius `well` m as deep as fines get, and the mud in it."""
     slowest = min((one.rate for one in handed.mud if one.rate > 0), default=1.0)
@@ -260,12 +262,11 @@ def _around(
 
 def _steepest(handed: HandedUp) -> float:
     """Rate of filtration at the face when it closes, 1/m."""
-    deposit = handed.closing if math.isfinite(handed.closing) else 0.0
-    return max(one.rate * (1 + max(one.growth, 0.0) * deposit) for one in handed.mud)
+    return max(one.rate * (1 + max(one.growth, 0.0) * handed.closing) for one in handed.mud)
 
 
 def _marched(
-    handed: HandedUp, column: Column, drives: Sequence[Drive], taps: Array | None
+    handed: HandedUp, column: Column, drives: Sequence[Flood], taps: Array | None
 ) -> March:
     viscosity = handed.run.case.fluid.viscosity_Pa_s
     return march(
@@ -283,8 +284,8 @@ def _marched(
 
 _STOPPED = {
     "": "",
-    "closed": "the face closed and the cake is not known: the numbers are those of that time; "
-    "give --cake-permeability or --api-filtrate",
+    "closed": "the numbers are those of the time when the face had the deposit of the run's end, "
+    "for no cake is known; give --cake-permeability or --api-filtrate",
     "full": "the cake of these fines alone fills the hole: the numbers are those of that time. "
     "A mud that has finer solids too holds back its filtrate; give --api-filtrate",
 }
@@ -371,7 +372,7 @@ def with_band(row: Mapping[str, Any], key: str) -> str:
     """The number of a row with its band; a share in percent."""
     share = key.endswith(("_over_k0", "_lost"))
     values = [row[key], row.get(f"{key}_low"), row.get(f"{key}_high")]
-    one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.2g}" for v in values)
+    one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.3g}" for v in values)
     unit = " %" if share else ""
     return f"{one}{unit}" if None in band else f"{one}{unit} ({band[0]} to {band[1]}{unit})"
 

@@ -237,12 +237,15 @@ def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
         return
     final = "final" if summary["final"] else "not final"
     yield f"The result is {final}, because {summary['words']['end']}."
+    if "method_error" in summary:
+        yield f"It is by the fast model of size classes: {summary['method_error']}."
     scatter = summary.get("scatter")
-    if scatter and summary.get("invaded_count"):
+    if scatter and summary.get("invaded_count") and summary["final"]:
+        own = "" if summary["case"] in scatter["source"] else ", and not of this case"
         yield (
             f"This is one run with one seed ({summary['seed']}); the ± are one standard deviation "
-            f"of {scatter['runs']} runs ({scatter['source']}). `fdnet ensemble CASE --seeds 8` "
-            "gives the band of your own case."
+            f"of {scatter['runs']} seeds of {scatter['source']}{own}. `fdnet ensemble CASE "
+            "--seeds 8` gives the band of your own case."
         )
 
 

@@ -5,6 +5,8 @@ of the run folder follow from it. Fines are drawn as spheres at places in their 
 each, or one for several of them where there would be more than `MOST_ROWS`.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,13 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fdnet.case.case import InvasionCase
-from fdnet.classes.capture import Bed, SizeClasses, mud_classes
+from fdnet.case.tables import InvasionChoices
+from fdnet.classes.capture import SizeClasses, mud_classes
 from fdnet.classes.deposit import PACKED, Deposits, Sieve, sieve_of, thickness_of_cake
 from fdnet.classes.invasion import (
     Course,
     PackStateOf,
     api_filtrate,
-    api_permeability,
+    bed_of,
+    cake_permeability,
     cake_resistance,
     flows_through,
     invade_classes,
@@ -36,7 +40,6 @@ from fdnet.network.flow.sections import (
     reduction,
     slab_permeability,
 )
-from fdnet.network.laws.damage import CLEAN
 from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.network import Network, build_network
 from fdnet.report.tables import write_rows
@@ -58,7 +61,7 @@ TRIES = 8
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ClassModel:
-    """A pack as the fast model sees it."""
+    """A pack as the fast model sees it; `parcel` m3 is drawn as one sphere at least."""
 
     network: Network
     clean: Array
@@ -66,16 +69,27 @@ class ClassModel:
     classes: SizeClasses
     course: Course
     flow: PackStateOf
+    parcel: float
+
+    def counted(self, volumes: Array) -> "Counts":
+        """Solids (3, C) m3 inside, passed and in the cake as counts, each rounded."""
+        own = self.classes.volume
+        parcel = max(self.parcel, float(volumes.sum()) / MOST_ROWS)
+        per_row = np.maximum(np.ceil(parcel / own * (1.0 - 1e-9)), 1.0)
+        invaded, passed, upstream = np.rint(volumes / own / per_row).astype(int)
+        return Counts(per_row=per_row, invaded=invaded, passed=passed, upstream=upstream)
 
 
 def class_model(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> ClassModel:
     """The model of a case. Raises NetworkError or FlowError where the pack has no flow."""
+    choices = InvasionChoices() if case.invasion is None else case.invasion
     network = build_network(grains, periodic=case.periodic, walls=case.analysis.walls)
     halves = grain_resistances(network)
     clean = 1.0 / halves.sum(axis=1)
     first = solve_flow(network, clean)
     sieve = sieve_of(network, halves, first.throat_flux)
-    classes = mud_classes(case.fines, 8 if case.invasion is None else case.invasion.classes)
+    below = case.fines.finest_m if case.with_classes else math.inf
+    classes = mud_classes(case.fines, choices.classes, below=below)
     permeability = first.inflow * sieve.length / sieve.area
     return ClassModel(
         network=network,
@@ -84,6 +98,7 @@ def class_model(case: InvasionCase, scales: InvasionScales, grains: Snapshot) ->
         classes=classes,
         course=_course(case, scales, permeability, sieve),
         flow=flows_through(network, sieve, clean),
+        parcel=case.fines.mean_volume_m3 if case.with_classes else 0.0,
     )
 
 
@@ -111,24 +126,7 @@ def _course(
         cap_time=scales.cap_time * physical,
         supply=solids,
         sticking=0.0 if case.invasion is None else case.invasion.sticking,
-        bed=Bed(
-            diameter=case.grains.sauter_diameter_m,
-            porosity=scales.porosity,
-            velocity=velocity,
-            viscosity=case.fluid.viscosity_Pa_s,
-            density=case.fluid.density_kg_m3,
-        ),
-    )
-
-
-def cake_permeability(case: InvasionCase) -> float | None:
-    """Permeability, m2, of the cake that the case gives, or its API filtrate; None without."""
-    if case.cake is None or case.cake.api_filtrate_m3 is None:
-        return None if case.cake is None else case.cake.permeability_m2
-    return api_permeability(
-        case.cake.api_filtrate_m3,
-        viscosity=case.fluid.viscosity_Pa_s,
-        solids=case.fines.volume_fraction,
+        bed=bed_of(case, scales, velocity),
     )
 
 
@@ -147,7 +145,7 @@ def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) ->
     }
     with replacing(folder / STATE) as part:
         np.savez_compressed(part, **arrays)
-    counts = counted(model.classes, end.by_class[-1])
+    counts = model.counted(end.by_class[-1])
     write_rows(folder / HISTORY, history_of(model.classes, end.by_class, counts.per_row))
     missing = float(np.abs(end.solids.missing).max())
     return {
@@ -185,10 +183,13 @@ class Kept:
     rows: tuple[dict[str, float], ...]
 
 
-def read_classes(folder: Path) -> Kept:
-    """The end of the invasion in `folder`."""
-    with np.load(folder / STATE) as data:
+def read_classes(path: Path, last: Mapping[str, float] | None = None) -> Kept:
+    """The end of an invasion; with `last`, the row of its last update, one beside spheres."""
+    with np.load(path) as data:
         solids = Deposits(**{one.name: data[one.name] for one in fields(Deposits)})
+        if last is not None:
+            volumes = np.array([[solids.inside_by_class, solids.passed, solids.cake]])
+            return Kept(solids=solids, kept=data["kept"], by_class=volumes, rows=(dict(last),))
         columns = {name[4:]: data[name].tolist() for name in data.files if name[:4] == "row_"}
         rows = [
             dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)
@@ -220,14 +221,6 @@ class Counts:
     def supplied(self) -> Array:
         """(C,) rows of all."""
         return self.invaded + self.passed + self.upstream
-
-
-def counted(classes: SizeClasses, volumes: Array) -> Counts:
-    """Solids (3, C) m3 inside, passed and in the cake as counts, each rounded."""
-    parcel = float(volumes.sum()) / MOST_ROWS
-    per_row = np.maximum(np.ceil(parcel / classes.volume * (1.0 - 1e-9)), 1.0)
-    invaded, passed, upstream = np.rint(volumes / classes.volume / per_row).astype(int)
-    return Counts(per_row=per_row, invaded=invaded, passed=passed, upstream=upstream)
 
 
 def history_of(classes: SizeClasses, by_class: Array, per_row: Array) -> list[dict[str, int]]:
@@ -313,78 +306,92 @@ def _before(model: ClassModel, count: int, solids: Deposits, rng: np.random.Gene
 
 
 def analysed_classes(
-    model: ClassModel, kept: Kept, clean: "Analysis", spheres: Snapshot
+    model: ClassModel, kept: Kept, base: "Analysis", spheres: Snapshot
 ) -> "Analysis":
-    """The analysis with the deposit of the classes; `clean` is that of the grains alone."""
+    """The analysis with the deposit of the classes; `base` is that without them.
+
+    A permeability is that of `base` times what the classes leave of it in the network of grains.
+    """
     network, sieve, fines = model.network, model.sieve, spheres.fines()
-    raised = np.sum(sieve.halves / kept.kept, axis=1)
-    factor = np.where(raised > 0, ratio(sieve.halves.sum(axis=1), raised), 1.0)
-    conductance = frozen(clean.conductance_initial * factor)
+    raised = ratio(base.conductance_initial, base.conductance_damaged)
+    before = sieve.halves * np.where(raised > 0, raised, 1.0)[:, None]
+    halves = before / kept.kept
+    raised = halves.sum(axis=1)
+    factor = np.where(raised > 0, ratio(before.sum(axis=1), raised), 1.0)
+    conductance = frozen(base.conductance_damaged * factor)
     flow = solve_flow(network, conductance)
-    k = clean.k_initial * (flow.inflow / clean.flow_initial.inflow if flow.inflow else 0.0)
-    halves = sieve.halves / kept.kept
+    left = flow.inflow / base.flow_damaged.inflow if flow.inflow else 0.0
+    k = base.k_damaged * left
     depth = fines.position[fines.position[:, 0] >= network.box[0, 0], 0] - network.box[0, 0]
-    low = np.array([one.x_lo for one in clean.sections])
-    edges = np.append(low, clean.sections[-1].x_hi)
+    low = np.array([one.x_lo for one in base.sections])
+    edges = np.append(low, base.sections[-1].x_hi)
     inplace = inplace_permeability(network, flow, edges, halves)
-    first = inplace_permeability(network, clean.flow_initial, edges, sieve.halves)
-    filled, bins = _filled_by_depth(model, kept.solids), clean.profile.edges
+    first = inplace_permeability(network, base.flow_damaged, edges, before)
+    filled, bins = _filled_by_depth(model, kept.solids), base.profile.edges
     profile = replace(
-        clean.profile,
-        porosity_damaged=frozen(clean.profile.porosity_initial - _share(filled, bins, sieve)),
+        base.profile,
+        porosity_damaged=frozen(base.profile.porosity_damaged - _share(filled, bins, sieve)),
         fines_fraction=frozen(np.histogram(depth, bins)[0] / max(len(depth), 1)),
     )
     sections, count = [], np.histogram(depth, edges)[0]
     for one, damaged, intact, number, taken in zip(
-        clean.sections, inplace, first, count, _share(filled, edges, sieve), strict=True
+        base.sections, inplace, first, count, _share(filled, edges, sieve), strict=True
     ):
         cut = [
             slab_permeability(network, g, (one.x_lo, one.x_hi))[0]
-            for g in (clean.conductance_initial, conductance)
+            for g in (base.conductance_damaged, conductance)
         ]
-        after = one.k_initial * min(cut[1] / cut[0] if cut[0] > 0 else 0.0, 1.0)
+        after = one.k_damaged * min(cut[1] / cut[0] if cut[0] > 0 else 0.0, 1.0)
         sections.append(
             replace(
                 one,
-                porosity_damaged=one.porosity_initial - float(taken),
+                porosity_damaged=one.porosity_damaged - float(taken),
                 k_damaged=after,
                 k_reduction=reduction(one.k_initial, after),
-                k_damaged_inplace=one.k_initial_inplace * float(damaged / intact),
+                k_damaged_inplace=one.k_damaged_inplace * float(damaged / intact),
                 fines_count=int(number),
                 fines_fraction=float(number / max(len(depth), 1)),
             )
         )
-    grain = 2.0 * network.grain_radius
-    thin = layer_edges(network.box, grain / 4.0)
-    pair = ((clean.flow_initial, sieve.halves), (flow, halves))
-    drops = [-np.diff(plane_pressures(network, one, thin, side)) for one, side in pair]
-    values = [inplace_permeability(network, one, thin, side) for one, side in pair]
+    thin = layer_edges(network.box, network.grain_radius / 2.0)
+    thin = thin if base.layers is None else base.layers.edges
+    three = ((base.flow_initial, sieve.halves), (base.flow_damaged, before), (flow, halves))
+    drops = [-np.diff(plane_pressures(network, one, thin, side)) for one, side in three]
+    values = [inplace_permeability(network, one, thin, side) for one, side in three]
+    layers = base.layers or Layers(
+        edges=frozen(thin),
+        k_initial=frozen(values[0]),
+        k_damaged=frozen(values[1]),
+        drop_initial=frozen(drops[0]),
+        drop_damaged=frozen(drops[1]),
+        fines_count=frozen(np.zeros(len(thin) - 1, int)),
+    )
     taken = float(_share(filled, edges[[0, -1]], sieve)[0])
+    other, cake = base.k_damaged_other, thickness_of_cake(sieve, kept.solids)
     return replace(
-        clean,
-        occupancy=_occupancy(model, kept, spheres, factor),
-        damage_law_used=SIZE_CLASSES,
+        base,
+        occupancy=_occupancy(model, kept, base.occupancy, spheres, factor),
+        damage_law_used=base.damage_law_used or SIZE_CLASSES,
+        k_damaged_other=None if other is None else other * left,
         conductance_damaged=conductance,
-        law_used=frozen(np.where(factor < 1.0, SIZE_CLASSES, CLEAN)),
+        law_used=frozen(np.where(factor < 1.0, SIZE_CLASSES, base.law_used)),
         flow_damaged=flow,
         k_damaged=k,
-        k_reduction=reduction(clean.k_initial, k),
-        porosity_damaged=clean.porosity_initial - taken,
+        k_reduction=reduction(base.k_initial, k),
+        porosity_damaged=base.porosity_damaged - taken,
         sections=tuple(sections),
         profile=profile,
-        layers=Layers(
-            edges=frozen(thin),
-            k_initial=frozen(values[0]),
-            k_damaged=frozen(values[1]),
-            drop_initial=frozen(drops[0]),
-            drop_damaged=frozen(drops[1]),
+        layers=replace(
+            layers,
+            k_damaged=frozen(layers.k_damaged * ratio(values[2], values[1])),
+            drop_damaged=frozen(layers.drop_damaged * ratio(drops[2], drops[1])),
             fines_count=frozen(np.histogram(depth, thin)[0]),
         ),
         invaded_count=len(depth),
-        invaded_volume=float(sum(one.sum() for one in kept.solids.inside)),
+        invaded_volume=base.invaded_volume + float(sum(one.sum() for one in kept.solids.inside)),
         invasion_depth=float(depth.max(initial=0.0)),
         invasion_depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
-        cake_thickness=thickness_of_cake(sieve, kept.solids),
+        cake_thickness=base.cake_thickness + cake,
     )
 
 
@@ -409,10 +416,14 @@ def _share(filled: tuple[Array, Array, Array], edges: Array, sieve: Sieve) -> Ar
     return np.diff(below) / (sieve.area * np.diff(edges))
 
 
-def _occupancy(model: ClassModel, kept: Kept, spheres: Snapshot, factor: Array) -> Occupancy:
+def _occupancy(
+    model: ClassModel, kept: Kept, base: Occupancy | None, spheres: Snapshot, factor: Array
+) -> Occupancy:
     """What the solids take of throats and pores; a throat with less than 1 % left is blocked."""
     network, sieve, solids = model.network, model.sieve, kept.solids
-    empty = measure_occupancy(network, spheres.fines().where(np.zeros(len(spheres.fines()), bool)))
+    if base is None:
+        none = spheres.fines().where(np.zeros(len(spheres.fines()), bool))
+        base = measure_occupancy(network, none)
     held = (solids.in_pores + solids.attached).sum(axis=1)
     surface = (solids.in_pores + solids.attached) @ (6.0 / model.classes.diameter)
     share = (
@@ -423,19 +434,22 @@ def _occupancy(model: ClassModel, kept: Kept, spheres: Snapshot, factor: Array) 
     whole = np.maximum(network.pore_share, 0.125)
     in_throats = solids.in_throats.sum(axis=1)
     number = solids.in_throats @ (1.0 / model.classes.volume)
-    mean = ratio(solids.in_throats @ (0.5 * model.classes.diameter / model.classes.volume), number)
+    sizes = solids.in_throats @ (0.5 * model.classes.diameter / model.classes.volume)
+    mean = ratio(sizes + base.throat_fine_radius * base.throat_fines, number + base.throat_fines)
     cylinder = np.pi * network.throat_radius**2 * network.throat_length
     solid = held[network.pore_group] * share / whole
     return replace(
-        empty,
-        throat_solid_volume=frozen(in_throats),
-        throat_porosity=frozen(1.0 - ratio(in_throats, cylinder)),
+        base,
+        throat_solid_volume=frozen(base.throat_solid_volume + in_throats),
+        throat_porosity=frozen(base.throat_porosity - ratio(in_throats, cylinder)),
         throat_fine_radius=frozen(mean),
-        throat_fines=frozen(np.ceil(number - 1e-9).astype(int)),
-        blocked=frozen(factor < 0.01),
-        pore_solid_volume=frozen(solid),
-        pore_solid_surface=frozen(surface[network.pore_group] * share / whole),
-        pore_porosity=frozen(ratio(network.pore_volume - solid, network.pore_tetra_volume)),
+        throat_fines=frozen(base.throat_fines + np.ceil(number - 1e-9).astype(int)),
+        blocked=frozen(base.blocked | (factor < 0.01)),
+        pore_solid_volume=frozen(base.pore_solid_volume + solid),
+        pore_solid_surface=frozen(
+            base.pore_solid_surface + surface[network.pore_group] * share / whole
+        ),
+        pore_porosity=frozen(base.pore_porosity - ratio(solid, network.pore_tetra_volume)),
         fines=spheres.fines(),
     )
 
@@ -451,8 +465,8 @@ def finished_classes(
     folder: Path,
 ) -> tuple[FinishedInvasion, ClassModel, Kept]:
     """The invasion in `folder`, with its model and what the classes left."""
-    model, kept = class_model(case, scales, grains), read_classes(folder)
-    counts = counted(model.classes, kept.by_class[-1])
+    model, kept = class_model(case, scales, grains), read_classes(folder / STATE)
+    counts = model.counted(kept.by_class[-1])
     fines = spheres_at_the_end(case, model, kept, counts)
     last = Checkpoint(
         chunk=len(kept.rows),
@@ -486,7 +500,7 @@ def finished_classes(
 def class_summary(case: InvasionCase, model: ClassModel, kept: Kept) -> dict[str, Any]:
     """The keys that the fast model adds to summary.json."""
     solids, last = kept.solids, kept.rows[-1]
-    counts = counted(model.classes, kept.by_class[-1])
+    counts = model.counted(kept.by_class[-1])
     inside = solids.inside_by_class
     permeability, drop = cake_permeability(case), last["pressure_cake_Pa"]
     api = None
@@ -508,7 +522,10 @@ def class_summary(case: InvasionCase, model: ClassModel, kept: Kept) -> dict[str
         }
         for i in range(len(classes.diameter))
     ]
-    return {
+    resistance = cake_resistance(
+        model.course.cake_permeability, model.sieve, solids, model.classes
+    )
+    common = {
         "method": "network",
         "method_error": METHOD_ERROR,
         "classes": rows,
@@ -516,17 +533,20 @@ def class_summary(case: InvasionCase, model: ClassModel, kept: Kept) -> dict[str
         "rate_over_initial": last["rate_over_initial"],
         "filtrate_m3": last["filtrate_m3"],
         "api_filtrate_mL": api,
+    }
+    if case.with_classes:
+        return common | {"method": "both", "cake_of_classes_1_m": resistance}
+    return common | {
         "cake_resistance_share": drop / max(drop + last["pressure_pack_Pa"], 1e-300),
-        "cake": _cake(case, model, kept, counts),
+        "cake": _cake(case, model, kept, counts, resistance),
     }
 
 
 def _cake(
-    case: InvasionCase, model: ClassModel, kept: Kept, counts: Counts
+    case: InvasionCase, model: ClassModel, kept: Kept, counts: Counts, resistance: float
 ) -> dict[str, Any] | None:
     """The cake as the summary of any run has it; None where no solids stand before the face."""
     sieve, solids = model.sieve, kept.solids
-    resistance = cake_resistance(model.course, sieve, solids, model.classes)
     if not resistance:
         return None
     thickness = thickness_of_cake(sieve, solids)

@@ -169,7 +169,7 @@ class _Springs(JsonObject):
     """The last time step, and the stiffness of the stiffest contact at first and last."""
 
     dem_dt_last_s: float
-    stiffness_N_m: tuple[float, float]
+    stiffness_N_m: list[float]
 
 
 class StageRecord(JsonObject):

@@ -4,7 +4,7 @@ The derivation is on docs/physics.md, "The field of the network".
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -102,12 +102,14 @@ class Carried:
         ratio: (P,) flux over that of the intact pack at the same rate through the specimen.
         stagnant: number of pores that carry next to nothing when clean; their ratio is 1.
         pressed: forces of the fluid on grains and fines over the drop of pressure.
+        flow: through the damaged network.
     """
 
     k_over_k0: float
     ratio: Array
     stagnant: int
     pressed: Pressed
+    flow: Flow
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -179,6 +181,7 @@ class PackFlow:
             ratio=np.divide(share, self.through, out=np.ones_like(share), where=moving),
             stagnant=int(np.sum(~moving)),
             pressed=self._pressed(factor, flow, fines),
+            flow=flow,
         )
 
     def _pressed(self, factor: Array, flow: Flow, fines: Array) -> Pressed:
@@ -265,6 +268,11 @@ def pore_through(network: Network, flow: Flow) -> Array:
     return (np.maximum(into, out) / flow.inflow)[group]
 
 
+Narrowed = Callable[[Array, Array], tuple[Array, bool]]
+"""What solids finer than the spheres leave of the shares (T, 2) that sides with spheres keep, with
+the volumes (P,) m3 of these in the pores; and whether the network must be solved anew for it."""
+
+
 @dataclass(slots=True, eq=False)
 class Renewal:
     """What a damaged pack carries: its deposit followed, its network solved when enough changed.
@@ -287,11 +295,14 @@ class Renewal:
     carried: Carried | None = None
     solves: int = 0
 
-    def of(self, fines: Snapshot, *, anew: bool) -> tuple[Carried, KeptDeposit]:
+    def of(
+        self, fines: Snapshot, *, anew: bool, finer: Narrowed | None = None
+    ) -> tuple[Carried, KeptDeposit]:
         """What the pores carry with standing `fines`, which are `placed`.
 
         The network is solved when enough of them changed, and where `anew` asks. What a solve
-        gives does not depend on earlier ones, to the last digit.
+        gives does not depend on earlier ones, to the last digit. `finer` solids narrow what these
+        fines leave.
         """
         inside, pack = fines.where(reaching_inside(self.pack.network, fines)), self.pack
         if self.deposit is None:
@@ -300,8 +311,15 @@ class Renewal:
             self.deposit = self.deposit.changed_to(inside)
         if anew or self.carried is None or changed_share(self.solved, inside) > self.renewed:
             self.sections = pack.sections(inside, self.sections)
-            self.carried = pack.carried(self.sections.factor, self.deposit.in_pores)
-            self.solved, self.solves = inside, self.solves + 1
+            self.carried, self.solved = None, inside
+        assert self.sections is not None
+        kept = self.sections.factor
+        if finer is not None:
+            kept, grown = finer(kept, self.deposit.in_pores)
+            self.carried = None if grown else self.carried
+        if self.carried is None:
+            self.carried = pack.carried(kept, self.deposit.in_pores)
+            self.solves += 1
         return self.carried, self.deposit
 
 

@@ -56,7 +56,8 @@ class Results:
         sizes: of grains and fines with measured curves.
         cleaned: what the clean-up gave; None without one.
         added: results that only some runs have.
-        numbers: of the summary, that only the fast model has.
+        numbers: of the summary, that only size classes give.
+        finer: fines of classes beside the spheres of LIGGGHTS; None without any.
     """
 
     path: Path
@@ -67,11 +68,13 @@ class Results:
     cleaned: Returned | None = None
     added: tuple[Added, ...] = ()
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    finer: Snapshot | None = None
 
     @property
     def shown(self) -> Snapshot:
         """The specimen at the end: damaged, or the intact grains."""
-        return self.grains if self.invasion is None else self.invasion.damaged
+        end = self.grains if self.invasion is None else self.invasion.damaged
+        return end if self.finer is None else end.joined(self.finer)
 
     @property
     def history_rows(self) -> list[dict[str, float]]:
@@ -267,7 +270,7 @@ def _cake(results: Results, one: FinishedInvasion) -> Added:
     case, analysis = one.case, results.analysis
     cake = measure_cake(one.damaged, case.periodic)
     pack = case.size_m[0] / analysis.k_damaged if analysis.k_damaged > 0 else np.inf
-    summary = cake_summary(cake, pack)
+    summary = cake_summary(cake, pack, results.numbers.get("cake_of_classes_1_m", 0.0))
     if cake is None:
         return Added(name="cake", summary=summary)
     rows = cake_rows(cake)

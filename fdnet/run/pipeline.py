@@ -21,7 +21,14 @@ from fdnet.network.warm_up import compiling
 from fdnet.report import html, tables
 from fdnet.report.text import case_words, thesis_law_warning
 from fdnet.run.answer import with_answer
-from fdnet.run.by_classes import analysed_classes, class_summary, finished_classes
+from fdnet.run.by_classes import (
+    analysed_classes,
+    class_model,
+    class_summary,
+    finished_classes,
+    read_classes,
+    spheres_at_the_end,
+)
 from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
 from fdnet.run.dem_stages import (
     file_warnings,
@@ -58,6 +65,7 @@ from fdnet.run.records import (
     RunOptions,
     Session,
     cores,
+    finer_file,
     record_warnings,
     stage_costs,
     stage_seconds,
@@ -343,7 +351,7 @@ def _analysed(session: Session, record: dict[str, Any] | None, *, returns: bool)
         options = case.analysis.changed(damage_law=first.damage_law_used)
         again = analyse(grains, state, periodic=case.periodic, options=options)
         after = compared(damaged, state, again)
-    return Results(
+    results = Results(
         path=session.path,
         grains=grains,
         invasion=invasion,
@@ -351,6 +359,8 @@ def _analysed(session: Session, record: dict[str, Any] | None, *, returns: bool)
         sizes=tuple(placed_sizes(case, grains, damaged, record["supplied"] if record else 0)),
         cleaned=after,
     )
+    finer = record is not None and finer_file(record["steps"]) in record["files"]
+    return with_finer(results, record["supplied"]) if record and finer else results
 
 
 def _analysed_classes(
@@ -371,6 +381,28 @@ def _analysed_classes(
         sizes=tuple(placed_sizes(case, grains, None, 0)),
         numbers=class_summary(case, model, kept),
     )
+
+
+def with_finer(results: Results, supplied: int) -> Results:
+    """The results with the classes that are finer than the spheres, of which `supplied` came.
+
+    Counts are of spheres and of rows of fines, each of which stands for a mean sphere's volume.
+    """
+    one, grains = results.invasion, results.grains
+    assert one is not None
+    case, last = one.case, one.history[-1]
+    model = class_model(case, one.scales, grains)
+    kept = read_classes(results.path / "invade" / finer_file(last.step), one.updates[-1])
+    counts = model.counted(kept.by_class[-1])
+    fines = spheres_at_the_end(case, model, kept, counts)
+    numbers = class_summary(case, model, kept) | {
+        "supplied_count": supplied + int(counts.supplied.sum()),
+        "passed_count": last.passed + int(counts.passed.sum()),
+        "upstream_count": last.upstream + int(counts.upstream.sum()),
+    }
+    everyone = one.damaged.joined(fines)
+    analysis = analysed_classes(model, kept, results.analysis, everyone)
+    return replace(results, analysis=analysis, finer=fines, numbers=numbers)
 
 
 def with_default_laws(

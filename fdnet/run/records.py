@@ -81,7 +81,8 @@ def invade_record(
     case: InvasionCase, result: Invasion, folder: Path, *, seconds: float
 ) -> dict[str, Any]:
     """invade/stage.json: how the invasion in `folder` ended."""
-    dumps = (f"post/invade_{row.step}.dump" for row in result.history)
+    dumps = [f"post/invade_{row.step}.dump" for row in result.history]
+    finer = finer_file(result.history[-1].step)
     return {
         "format": RECORD_FORMAT,
         "digest": case.digest("invade"),
@@ -99,10 +100,15 @@ def invade_record(
         "warnings": [explained(one) for one in result.warnings],
         "ranks": result.ranks,
         **_updates(result.updates),
-        "files": digests_of(folder, [HISTORY, WATCH, UPDATES, *dumps]),
+        "files": digests_of(folder, [HISTORY, WATCH, UPDATES, finer, *dumps]),
         "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out],
     }
+
+
+def finer_file(step: int) -> str:
+    """Where an invasion of spheres and finer classes keeps the classes at a checkpoint."""
+    return f"post/invade_{step}.npz"
 
 
 def _updates(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
@@ -370,10 +376,7 @@ class Session:
         return stage in self.options.stages and stage in self.case.stages
 
     def launch(self, progress: Progress) -> Launch:
-        """How a stage that begins now starts LIGGGHTS; the binary is looked for when first needed.
-
-        The time limit is that of the stage, however often LIGGGHTS is started in it.
-        """
+        """How a stage that begins now starts LIGGGHTS, within its time limit."""
         options = self.options
         if self._binary is None:
             self._binary = find_binary(options.liggghts, launcher=options.launcher)

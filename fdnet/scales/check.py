@@ -191,7 +191,7 @@ def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Fin
             read="docs/how-to/your_sand_and_your_mud.md",
         )
     # the finest tenth of the solids makes most of the time
-    if not fines.measured or curve.low == curve.high:
+    if not fines.measured or curve.low == curve.high or case.by_classes:
         return
     cut = float(f"{1e6 * curve.size_at(FINE_SHARE):.2g}")
     data = case.data()

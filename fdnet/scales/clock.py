@@ -43,7 +43,7 @@ bridge end after two volumes of the pores, and no mud has more fines than the la
 
 def supplied_solids(case: InvasionCase, slab: float) -> float:
     """Fines of a slab of `slab` m a unit of face, over the median diameter of the grains."""
-    return slab * case.fines.placed_fraction / case.grains.curve.size_at(0.5)
+    return slab * case.solids_fraction / case.grains.curve.size_at(0.5)
 
 
 def present_share(case: InvasionCase, *, duration: float, feeding: float) -> float:
@@ -125,7 +125,7 @@ def slab_of(case: InvasionCase, throat_ratio: float) -> Slab:
 def _most_mud(case: InvasionCase, throat_ratio: float) -> Slab:
     """The slab of mud that comes until the stop rule; its last fine is that of the bound."""
     share, area = case.fines.placed_fraction, case.size_m[1] * case.size_m[2]
-    length = MUD_SOLIDS * case.grains.curve.size_at(0.5) / share
+    length = MUD_SOLIDS * case.grains.curve.size_at(0.5) / case.solids_fraction
     if throat_ratio < BRIDGING:
         length = min(length, MUD_PORES * target_porosity(case) * case.size_m[0])
     per_length = share * area / case.fines.mean_volume_m3

@@ -45,6 +45,9 @@ BYTES_PER_SPHERE = 600
 REPORT_BYTES, NETWORK_BYTES = 6.0e8, 8.0e3
 """Memory of the report, and of the network for each of up to `MOST_SPHERES` spheres."""
 
+CLASS_SECONDS = 7e-3
+"""s for each grain of the fast model, whose steps solve the flow some hundred times."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
@@ -79,6 +82,9 @@ def cost_of(case: Case, scales: Scales) -> Cost:
     python = START_SECONDS + REPORT_SECONDS
     if not isinstance(case, InvasionCase) or not isinstance(scales, InvasionScales):
         return Cost(pack_seconds=pack, analyse_seconds=python + grains * SPHERE_SECONDS)
+    if case.by_classes:
+        fast, known = grains * CLASS_SECONDS, python + grains * SPHERE_SECONDS
+        return Cost(pack_seconds=pack, invade_seconds=fast, analyse_seconds=known)
     duration, drag = expected_duration(case, scales), case.drag
     steps = math.ceil(duration / scales.time_step)
     feeding = scales.slab_length / scales.upstream_velocity

@@ -249,7 +249,7 @@ def single_fines(
     points.cut(None)
     launch = Launch(binary=the_binary())
     stage = InvadeStage(case=case, scales=scales, grains=grains, points=points, launch=launch)
-    run_deck(folder, "in.invade", replace(launch, follow=stage.keeper()))
+    run_deck(folder, "in.invade", replace(launch, follow=stage.follow))
     last = invade(case, scales, grains, folder, launch).history[-1]
     supplied = float(last.upstream + last.invaded + last.passed)
     overlap = max_overlap(grains, case.periodic)
@@ -517,7 +517,7 @@ def free(trial: Trial) -> Seen:
     case = with_fines(case_from(tables))
     scales, launch = invasion_scales(case), Launch(binary=the_binary())
     lone = resting(np.array([[2.7e-3, 3e-4, 3e-4]]), GRAIN, deck.specimen_box(case), Kind.GRAIN)
-    end = invade(case, scales, lone, trial.folder, launch).damaged.fines().velocity[0]
+    end = invade(case, scales, lone, trial.folder, launch).state.fines().velocity[0]
     share = 2 / 9 * FINE**2 * scales.porosity / scales.permeability
     slip = np.array([share * SPEED, 0.0, 0.0])
     if pull:

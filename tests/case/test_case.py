@@ -57,7 +57,7 @@ def test_every_problem_is_listed_at_once():
 
 def test_a_bad_value_is_named_with_its_path():
     for part, values, expected in [
-        ("fines", {"radius_mm": 0.3}, "not below grains.radius_mm 0.25"),
+        ("fines", {"radius_mm": 0.3}, "expected below grains.radius_mm 0.25"),
         ("fines", {"slab_mm": 2.0}, "give one of the two, or none"),
         ("fines", {"concentration": 0.4}, "fines.concentration: 0.4"),
         ("grains", {"radius_mm": [0.3, 0.2]}, "must rise"),
@@ -267,7 +267,10 @@ def test_bad_input_is_one_clear_error(tmp_path, capsys):
             ({"mud": '{ D10 = "20 um", D50_mm = 0.04, D50 = "40 um" }'}, "give one of the two"),
             ({"sand": SAND.replace("0.25 mm", "0.25")}, "'0.25': has no unit"),
             ({"mud": '{ D10 = "420 um", D50 = "430 um", D90 = "440 um" }'}, "above every throat"),
-            ({"mud": '{ D10 = "50 um", D50 = "150 um", D90 = "300 um" }'}, "is not below"),
+            (
+                {"mud": '{ D10 = "50 um", D50 = "150 um", D90 = "300 um" }'},
+                "solids as large as the grains",
+            ),
             (
                 {
                     "sand": '{ D50 = "0.40 mm", D90 = "0.402 mm" }',

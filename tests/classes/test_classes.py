@@ -47,6 +47,7 @@ def chain(count, *, step=1.0, void=1e-3, surface=1.0, passage=1.0):
         halves=np.ones((count - 1, 2)),
         way=np.full(count - 1, step),
         void=np.full(count, void),
+        room=np.full(count, np.cbrt(void)),
         surface=np.full(count, surface),
         place=place,
         throat_place=0.5 * (place[1:] + place[:-1]),

@@ -1,0 +1,120 @@
+"""Spheres above the cut in LIGGGHTS, what is finer as classes in the same flow."""
+
+import numpy as np
+import pytest
+from builders import followed
+from cut_and_continue import differences
+
+from fdnet.case.file import case_from
+from fdnet.dem.checkpoint import Checkpoints
+from fdnet.dem.invasion import invade
+from fdnet.dem.liggghts import Launch
+from fdnet.errors import CaseError
+from fdnet.run.fluid import fluid_of
+from fdnet.run.pipeline import run_case
+from fdnet.scales.scales import scales_of
+
+pytestmark = pytest.mark.liggghts
+WIDE = {"D10_mm": 0.02, "D50_mm": 0.06, "D90_mm": 0.12}
+
+
+def mud(method, *more, cut=80.0, sizes=WIDE):
+    """15 grains, 100 spheres of a mud that is half finer than they are."""
+    tables = followed(*more, "fines.supply=batches").data()
+    fines = {"sizes": sizes, "count": 100, "concentration": 0.2, "supply": "batches"}
+    fines |= {} if cut is None else {"cut_um": cut}
+    return case_from(tables | {"fines": fines, "invasion": {"method": method}})
+
+
+@pytest.fixture(scope="module")
+def go(binary, grains_of):
+    def invaded(case, folder):
+        scales, grains = scales_of(case), grains_of(case)
+        fluid, launch = fluid_of(case, scales, grains), Launch(binary=binary)
+        return invade(case, scales, grains, folder, launch, fluid=fluid)
+
+    return invaded
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A finished run of all stages."""
+    return run_case(mud("both"), tmp_path_factory.mktemp("both") / "run")
+
+
+def test_a_continued_run_of_both_is_the_uncut_one(binary, grains_of, tmp_path):
+    case = mud("both")
+    assert differences(case, grains_of(case), tmp_path, binary) == []
+    last = [
+        sorted((tmp_path / one / "post").glob("*.npz"))[-1]
+        for one in ("whole", "at every checkpoint")
+    ]
+    assert last[0].read_bytes() == last[1].read_bytes()
+    assert len(list((tmp_path / "whole" / "post").glob("*.npz"))) == 2
+
+
+def test_a_changed_state_of_the_classes_makes_the_checkpoint_unusable(go, tmp_path):
+    case = mud("both")
+    done = go(case, tmp_path)
+    points = Checkpoints(folder=tmp_path, digest=case.digest("invade"))
+    last = done.history[-1].step
+    with points.path(last, "npz").open("r+b") as file:
+        file.seek(500)
+        file.write(b"noise")
+    assert points.last().step == done.history[-2].step
+    again = go(case, tmp_path)
+    assert again.updates == done.updates
+
+
+def test_without_solids_below_the_cut_it_is_the_run_of_spheres_byte_for_byte(go, tmp_path):
+    sizes = {"D10_mm": 0.09, "D50_mm": 0.1, "D90_mm": 0.11}
+    for method in ("liggghts", "both"):
+        go(mud(method, cut=None, sizes=sizes), tmp_path / method)
+    spheres, both = (
+        {
+            path.relative_to(folder): path.read_bytes()
+            for path in folder.rglob("*")
+            if path.suffix in (".csv", ".dump", ".restart")
+        }
+        for folder in (tmp_path / "liggghts", tmp_path / "both")
+    )
+    assert len(spheres) == 9
+    assert spheres == both
+
+
+def test_the_ledger_of_every_class_closes_and_the_classes_cost_permeability(whole):
+    rows, summary = whole.history, whole.summary
+    assert rows["classes_missing"].max() < 1e-12
+    classes = summary["classes"]
+    for one in classes:
+        found = one["inside_m3"] + one["passed_m3"] + one["cake_m3"]
+        assert found == pytest.approx(one["supplied_m3"], rel=1e-12)
+        assert min(one["inside_m3"], one["passed_m3"], one["cake_m3"]) >= 0.0
+    assert classes[-1]["to_m"] == pytest.approx(80e-6)
+    # the same mud: what comes of each class is the filtrate times its concentration
+    for one in classes:
+        assert one["supplied_m3"] == pytest.approx(
+            summary["filtrate_m3"] * one["concentration"], rel=1e-9
+        )
+    assert sum(one["concentration"] for one in classes) < 0.2
+
+
+def test_its_tables_hold_spheres_and_classes(whole):
+    summary = whole.summary
+    assert summary["method"] == "both"
+    counts = [summary[f"{name}_count"] for name in ("invaded", "passed", "upstream")]
+    assert sum(counts) == pytest.approx(summary["supplied_count"], abs=2)
+    fines = whole.spheres().fines()
+    assert len(fines) == counts[0] + counts[2]
+    sections = whole.sections
+    assert sections["fines_count"].sum() == summary["invaded_count"]
+    assert np.all(sections["k_damaged_m2"] <= sections["k_initial_m2"])
+    assert list(whole.pores.columns)
+
+
+def test_what_does_not_go_with_both_is_refused():
+    tables = mud("both").data()
+    with pytest.raises(CaseError, match="share one flow"):
+        case_from(tables | {"drag": {"field": "uniform"}})
+    with pytest.raises(CaseError, match="nothing turns the flow back"):
+        case_from(tables | {"clean_up": {"drawdown_MPa": 1.0}})
