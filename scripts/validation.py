@@ -21,6 +21,7 @@ CHAPTERS: dict[str, str] = {
     "truth": "validation.truth_solved",
     "outside": "validation.outside",
     "mechanics": "validation.mechanics",
+    "scoreboard": "validation.scoreboard",
     "bridging": "validation.bridging",
     "classes": "validation.classes",
     "size-classes": "validation.size_classes",

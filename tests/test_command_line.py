@@ -11,7 +11,7 @@ from fdnet.cli import FORMER, _parser, commands_of, main
 
 LISTED = (
     *("init", "run", "check", "permeability", "stokes"),
-    *("movie", "mechanics", "ensemble", "sweep", "compare"),
+    *("movie", "mechanics", "ensemble", "sweep", "compare", "core", "well"),
 )
 
 
@@ -21,7 +21,7 @@ def ended(arguments: list[str]) -> int:
     return int(end.value.code or 0)
 
 
-def test_fdnet_alone_lists_ten_commands(capsys):
+def test_fdnet_alone_lists_twelve_commands(capsys):
     assert main([]) == 0
     alone = capsys.readouterr().out
     assert ended(["--help"]) == 0

@@ -3,7 +3,7 @@
 import math
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib import metadata
@@ -22,11 +22,11 @@ from fdnet.statistics.differences import MOST_SEEDS
 if TYPE_CHECKING:
     import pandas as pd
 
-SHOWN = ("k_reduction", "damage.face_lost", "k_damaged_m2", "invasion_depth_p95_m")
-SHOWN += ("skin", "skin_flow_lost", "invaded_count", "passed_count")
+SHOWN = ["k_reduction", "damage.face_lost", "k_damaged_m2", "invasion_depth_p95_m"]
+SHOWN += ["skin", "skin_flow_lost", "invaded_count", "passed_count"]
 """Quantities of the tables of the page, after the ranked one."""
-LAYERS = ("porosity_initial", "porosity_damaged", "k_initial_m2", "k_damaged_m2", "k_reduction")
-LAYERS += ("fines_count",)
+LAYERS = ["porosity_initial", "porosity_damaged", "k_initial_m2", "k_damaged_m2", "k_reduction"]
+LAYERS += ["fines_count"]
 """Quantities of the tables by depth."""
 
 
@@ -110,7 +110,7 @@ def write_comparison(
         pairs=made.differences,
         figures=_draw(comparison),
         columns=_shown(comparison),
-        slabs=sorted(int(one[1]) for one in map(_EDGE.fullmatch, comparison.numbers) if one),
+        slabs=sorted({int(one[1]) for one in map(results.SLAB.match, comparison.numbers) if one}),
         layers=[one for one in html.SECTION_COLUMNS[3:] if one[0] in LAYERS],
         label=label,
         value_text=value_text,
@@ -126,9 +126,6 @@ def _shown(comparison: Comparison) -> list[str]:
     """The ranked quantity, and those of `SHOWN` that are known."""
     every = dict.fromkeys([comparison.ranked_by, *SHOWN])
     return [one for one in every if one in comparison.numbers]
-
-
-_EDGE = re.compile(r"sections\.(\d+)\.x_lo_m")
 
 
 def _link(page: Path, run: results.Entry) -> str:
@@ -163,6 +160,9 @@ LABELS = {
 """Quantities of a summary in words."""
 
 
+_K = re.compile(r"(?<!_m3)_m2$")
+
+
 def label(quantity: str) -> str:
     """A quantity in words; its key where it has none."""
     return LABELS.get(quantity, quantity)
@@ -174,7 +174,7 @@ def value_text(quantity: str, value: float | None) -> str:
         return html.DASH
     if results.SHARES.search(quantity):
         text = f"{percent(value)} %"
-    elif quantity.endswith("_m2"):
+    elif _K.search(quantity):
         text = f"{in_millidarcy(value)} mD"
     else:
         text = millimetres(value) if quantity.endswith("_m") else html.quantity(value)
@@ -202,10 +202,11 @@ def answer_words(comparison: Comparison) -> str:
     if not others:
         return first
     best = comparison.ranking()[0]
-    alike = [pair.other for pair in comparison.pairs() if pair.one == best and not pair.apart]
+    pairs = [pair for pair in comparison.pairs() if pair.one == best]
+    alike = [pair.other for pair in pairs if not pair.apart]
     said = f"{first.removeprefix('1. ')} "
     if not alike:
-        return f"{said}It is the smallest, and differs from every other variant."
+        return said + "It is the smallest, and differs from every other variant." * bool(pairs)
     more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
     return (
         f"{said}It is the smallest mean, but these seeds do not tell it apart from "
@@ -289,28 +290,23 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5
 
 def _draw(comparison: Comparison) -> dict[str, dict[str, str]]:
     """The figures that have data, drawn into the folder of the page, by the stem of their file."""
-    several = len(comparison.variants) > 1
-    known = [name for name in comparison.variants if comparison.values(name, _IN_PLACE)]
-    drawn = {}
-    if several and comparison.numbers.get(comparison.ranked_by):
-        caption = "Every run (grey), mean over the seeds (line) and its 95 % band (blue)."
-        drawn["ranking"] = (_fill_ranking, caption)
-    if known:
-        which = f", of the first {len(COLOURS)} variants" if len(known) > len(COLOURS) else ""
-        thin = "" if several else " Thin lines are the runs."
-        caption = (
-            "Permeability in place of the slabs after the invasion, mean over the seeds with its "
-            f"95 % band{which}; dashed is the intact sand.{thin}"
-        )
-        drawn["by_depth"] = (_fill_depth, caption)
-    shown = {}
-    for name, (fill, caption) in drawn.items():
+    shown, several = dict[str, dict[str, str]](), len(comparison.variants) > 1
+
+    def add(name: str, fill: Callable[..., None], caption: str) -> None:
         path = figures.draw(comparison.path / f"{name}.svg", partial(fill, comparison=comparison))
         shown[name] = html.shown_figure(path, caption)
+
+    if several and comparison.numbers.get(comparison.ranked_by):
+        caption = "Every run (grey), mean over the seeds (line) and its 95 % band (blue)."
+        add("ranking", _fill_ranking, caption)
+    if "sections.1.k_damaged_inplace_m2" in comparison.numbers:
+        more = f", of {len(COLOURS)} variants at most" if several else "; thin lines are the runs"
+        caption = (
+            "Permeability in place of the slabs after the invasion, mean over the seeds with its "
+            f"95 % band; dashed is the intact sand{more}."
+        )
+        add("by_depth", _fill_depth, caption)
     return shown
-
-
-_IN_PLACE = "sections.1.k_damaged_inplace_m2"
 
 
 def _fill_ranking(figure: Any, *, comparison: Comparison) -> None:
@@ -362,7 +358,7 @@ def _unit_of(quantity: str) -> tuple[float, str]:
     """Factor from SI to the unit that a figure has, and this unit."""
     if results.SHARES.search(quantity):
         return 100.0, "%"
-    if quantity.endswith("_m2"):
+    if _K.search(quantity):
         return 1 / MILLIDARCY, "mD"
     return (1e3, "mm") if quantity.endswith("_m") else (1.0, "–")
 

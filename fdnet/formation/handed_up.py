@@ -20,14 +20,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
-from fdnet.campaign.api import open_runs
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
 from fdnet.files import expanded
 from fdnet.formation.model import CakeOf, FineClass, Release, Rock
 from fdnet.report.figures import BLUE, DEPTH_LABEL, GREY, MM, draw, stairs
 from fdnet.run.finished import FinishedRun, open_run
-from fdnet.run.folder import is_run_folder
+from fdnet.run.folder import MANIFEST, is_run_folder
 from fdnet.spheres.snapshot import Array
 
 FEWEST, LEAST_LOSS, MISFIT, DRAWS, PLACES = 30, 0.02, 0.1, 24, 800
@@ -149,15 +148,16 @@ def hand_up(source: str | Path | FinishedRun, *, classes: int = 1) -> list[Hande
     folder = expanded(source)
     if is_run_folder(folder) or not folder.is_dir():
         return _of_run(open_run(folder), classes)
-    comparison = open_runs(folder).comparison
-    if not comparison.done:
-        raise CaseError(f"{folder}: no run of it is finished; run it first")
-    if len(comparison.variants) > 1:
+    done = [one.parent for one in sorted((folder / "runs").glob(f"*/{MANIFEST}"))]
+    if not done:
+        raise CaseError(f"{folder}: holds no finished run; give a run folder or an ensemble")
+    runs = [open_run(one) for one in done]
+    cases = [{**one.case.data(), "seed": 0} for one in runs]
+    if any(case != cases[0] for case in cases):
         raise CaseError(
-            f"{folder}: holds {len(comparison.variants)} variants, expected runs of one case that "
-            "differ by the seed; give the folder of one run or of an ensemble"
+            f"{folder}: its runs differ by more than the seed; give one of them, or an ensemble"
         )
-    return [_of_run(open_run(one.folder), classes)[0] for one in comparison.done]
+    return [_of_run(run, classes)[0] for run in runs]
 
 
 def _of_run(run: FinishedRun, classes: int) -> list[HandedUp]:

@@ -116,7 +116,7 @@ class CakeOf:
     shape: str = "linear"
 
 
-class Drive(NamedTuple):
+class Flood(NamedTuple):
     """What drives the flow for so many `seconds`: `pressure` Pa or `rate` m3/s, below 0 back."""
 
     seconds: float
@@ -162,7 +162,7 @@ def damage_skin(column: Column, loss: Array) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class State:
+class Filled:
     """Where the fines of C classes are, in J cells.
 
     Attributes:
@@ -211,7 +211,7 @@ class March:
     parts: Array
     k_over_k0: Array
     effluent: Array
-    end: State
+    end: Filled
     closed_at: float | None
     stopped: str
 
@@ -220,7 +220,7 @@ def march(
     column: Column,
     rock: Rock,
     mud: Sequence[FineClass],
-    drives: Sequence[Drive],
+    drives: Sequence[Flood],
     viscosity: float,
     *,
     cake: CakeOf | None = None,
@@ -244,7 +244,7 @@ def march(
         fineness: largest relative step; the error falls with it to first order.
     """
     cells, none = np.zeros((len(mud), len(column.width))), np.zeros(len(mud))
-    state = State(
+    state = Filled(
         **dict.fromkeys(("suspended", "deposit", "held"), cells),
         **dict.fromkeys(("cake", "supplied", "passed", "returned"), none),
         face=0.0,
@@ -316,7 +316,7 @@ def march(
 
 
 def _resistances(
-    state: State, column: Column, rock: Rock, cake: CakeOf | None, taps: Array
+    state: Filled, column: Column, rock: Rock, cake: CakeOf | None, taps: Array
 ) -> Array:
     """(S+2,) resistances over viscosity, 1/m3, of cake, sections and the rest of the way.
 
@@ -338,7 +338,7 @@ def _resistances(
 
 
 def _until(
-    state: State,
+    state: Filled,
     column: Column,
     rock: Rock,
     mud: Sequence[FineClass],
@@ -358,14 +358,14 @@ def _until(
 
 
 def _forward(
-    state: State,
+    state: Filled,
     column: Column,
     rock: Rock,
     mud: Sequence[FineClass],
     cake: CakeOf | None,
     shut: bool,
     volume: float,
-) -> tuple[State, Array]:
+) -> tuple[Filled, Array]:
     """The state after a `volume` m3 of inflow, and the mean effluent (C,).
 
     The filtration coefficients are those of the deposit half-way. Through a shut face no fines
@@ -400,8 +400,8 @@ def _forward(
 
 
 def _backward(
-    state: State, column: Column, rock: Rock, release: Release, volume: float
-) -> tuple[State, Array]:
+    state: Filled, column: Column, rock: Rock, release: Release, volume: float
+) -> tuple[Filled, Array]:
     """The state after a `volume` m3 has flowed back, and the mean that leaves the face (C,)."""
     pores = rock.porosity * column.volume
     gone = -np.expm1(-release.rate * column.width / column.volume * volume)

@@ -15,7 +15,7 @@ from fdnet.formation.model import (
     NO_RELEASE,
     CakeOf,
     Column,
-    Drive,
+    Flood,
     March,
     cake_skin,
     damage_skin,
@@ -82,7 +82,7 @@ def core_flood(
     _above_zero(length=length, diameter=diameter, minutes=minutes, sections=sections)
     _above_zero(rate=rate, pressure=pressure, back_flow=back_flow)
     area, taps = math.pi * diameter**2 / 4, np.linspace(0.0, length, sections + 1)
-    drive = Drive(60 * minutes, pressure or math.nan, rate)
+    drive = Flood(60 * minutes, pressure or math.nan, rate)
 
     def flooded(handed: HandedUp) -> dict[str, Any]:
         first = 0.01 / (_steepest(handed) + 1 / length)
@@ -93,7 +93,7 @@ def core_flood(
             flow = abs(float(made.rate[0]))
             seconds = back_flow * handed.rock.porosity * area * length / flow
             forth = drive._replace(seconds=float(made.time[-1]))
-            back = _marched(handed, column, [forth, Drive(seconds, rate=-flow)], taps).k_over_k0[
+            back = _marched(handed, column, [forth, Flood(seconds, rate=-flow)], taps).k_over_k0[
                 -1
             ]
         solids = sum(one.concentration for one in handed.mud)
@@ -184,7 +184,7 @@ def well_invasion(
             raise CaseError(f"radius: {well:g} m, expected below the drainage radius, {outer:g} m")
         if not over:
             raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
-        drive = Drive(3600 * hours, over)
+        drive = Flood(3600 * hours, over)
         hole, made = _around(handed, well, height, outer, drive)
         shots = SHOTS * SHOT_LENGTH
         shot, pierced = _around(handed, SHOT_RADIUS, height * shots, outer, drive)
@@ -246,7 +246,7 @@ def keep(folder: Path, name: str, found: Mapping[str, Any], given: Mapping[str, 
 
 
 def _around(
-    handed: HandedUp, well: float, height: float, outer: float, drive: Drive
+    handed: HandedUp, well: float, height: float, outer: float, drive: Flood
 ) -> tuple[Column, March]:
     """The rock around a hole of radius `well` m as deep as fines get, and the mud in it."""
     slowest = min((one.rate for one in handed.mud if one.rate > 0), default=1.0)
@@ -266,7 +266,7 @@ def _steepest(handed: HandedUp) -> float:
 
 
 def _marched(
-    handed: HandedUp, column: Column, drives: Sequence[Drive], taps: Array | None
+    handed: HandedUp, column: Column, drives: Sequence[Flood], taps: Array | None
 ) -> March:
     viscosity = handed.run.case.fluid.viscosity_Pa_s
     return march(
@@ -372,7 +372,7 @@ def with_band(row: Mapping[str, Any], key: str) -> str:
     """The number of a row with its band; a share in percent."""
     share = key.endswith(("_over_k0", "_lost"))
     values = [row[key], row.get(f"{key}_low"), row.get(f"{key}_high")]
-    one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.2g}" for v in values)
+    one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.3g}" for v in values)
     unit = " %" if share else ""
     return f"{one}{unit}" if None in band else f"{one}{unit} ({band[0]} to {band[1]}{unit})"
 

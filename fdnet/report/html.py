@@ -102,16 +102,14 @@ def mechanics_html(folder: Path) -> str:
         return ""
     advice = "measure it anew with fdnet mechanics, or remove the folder"
     numbers = read_json(path, Mechanics, noun="result of fdnet mechanics", advice=advice)
-    parts = [_table(numbers, Mechanics)]
-    if numbers.get("warnings"):
-        items = "".join(f"<li>{words(text)}</li>" for text in numbers["warnings"])
-        parts.append(f'<div class="warnings"><ul>{items}</ul></div>')
-    if numbers.get("triaxial"):
-        parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _Test)]
-    figure = folder / "stress_strain.png"
-    if numbers.get("triaxial") and figure.is_file():
-        parts.append(f'<figure><img src="{_data_uri(figure)}" alt="{figure.stem}"></figure>')
-    return _folded("Mechanics of the pack", "\n".join(parts))
+    figure, tested = folder / "stress_strain.png", numbers.get("triaxial")
+    return page_text(
+        "report/mechanics.html.j2",
+        elastic=_values(numbers, Mechanics),
+        warnings=numbers.get("warnings") or [],
+        triaxial=_values(tested, _Test) if tested else [],
+        figure=shown_figure(figure, figure.stem) if tested and figure.is_file() else None,
+    )
 
 
 def put_mechanics(report: Path, folder: Path) -> bool:
@@ -119,20 +117,14 @@ def put_mechanics(report: Path, folder: Path) -> bool:
     return put_section(report, MECHANICS, mechanics_html(folder))
 
 
-def _table(numbers: dict[str, Any], model: type[JsonObject]) -> str:
-    """The numbers that have a `Line` in the model."""
-    cells = []
-    for key, field_of in model.model_fields.items():
-        for one in (known for known in field_of.metadata if isinstance(known, Line)):
-            value = quantity(multiplied(numbers[key], one.factor), one.unit)
-            cells.append(
-                f'<tr><th>{html.escape(one.name)}</th><td class="number">{value}</td></tr>'
-            )
-    return '<div class="scroll"><table>\n' + "\n".join(cells) + "\n</table></div>"
-
-
-def _folded(title: str, content: str) -> str:
-    return f"<details><summary>{title}</summary>\n{content}\n</details>"
+def _values(numbers: dict[str, Any], model: type[JsonObject]) -> list[tuple[str, str]]:
+    """Name and text of the numbers that have a `Line` in the model."""
+    return [
+        (one.name, quantity(multiplied(numbers[key], one.factor), one.unit))
+        for key, known in model.model_fields.items()
+        for one in known.metadata
+        if isinstance(one, Line)
+    ]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -176,52 +168,11 @@ def formation_html(folder: Path) -> str:
 
 
 STOKES = "stokes"
-_HEAD = (
-    "depth (mm)",
-    "before, flow (mD)",
-    "before, network (mD)",
-    "after, flow (mD)",
-    "after, network (mD)",
-    "lost, flow",
-    "lost, network",
-    "cells of the flow (&micro;m)",
-)
-_NOTE = (
-    "Resolved flow solves the Stokes equations between all spheres on two grids and needs no law "
-    "of throats. The error behind &plusmn; is its own. The columns &ldquo;network&rdquo; hold "
-    "what the run has. Where the two differ by more than that error, the difference is the error "
-    "of the network. Cells are those of the finer grid, before and after. The damage law of the "
-    "network is {}."
-)
 
 
 def stokes_html(rows: Sequence[Mapping[str, Any]]) -> str:
     """The section as HTML, one row for each section that was resolved."""
-
-    def lost(value: float | None) -> str:
-        return "&ndash;" if value is None else f"{value:.1%}"
-
-    lines = [
-        [
-            f"{1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g}",
-            f"{in_millidarcy(row['k_initial_m2'])} &plusmn; {row['k_initial_error']:.1%}",
-            in_millidarcy(row["network_k_initial_m2"]),
-            f"{in_millidarcy(row['k_damaged_m2'])} &plusmn; {row['k_damaged_error']:.1%}",
-            in_millidarcy(row["network_k_damaged_m2"]),
-            lost(row["k_reduction"]),
-            lost(row["network_k_reduction"]),
-            f"{1e6 * row['cell_initial_m']:.3g}, {1e6 * row['cell_damaged_m']:.3g}",
-        ]
-        for row in rows
-    ]
-    head = "".join(f'<th class="number">{name}</th>' for name in _HEAD)
-    cells = ["".join(f'<td class="number">{text}</td>' for text in line) for line in lines]
-    body = "\n".join(f"<tr>{line}</tr>" for line in cells)
-    return _folded(
-        "Sections by resolved Stokes flow",
-        f'<div class="scroll"><table>\n<tr>{head}</tr>\n{body}\n</table></div>\n'
-        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>',
-    )
+    return page_text("report/stokes.html.j2", rows=rows)
 
 
 # ------------------------------------------------------------------------------------------------

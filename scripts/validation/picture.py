@@ -68,7 +68,7 @@ def _save(path: Path, heights: Sequence[float], fill: Callable[[Sequence["Axes"]
 
     with rc_context({"font.size": 8, "axes.titlesize": 8}):
         figure = Figure(figsize=(WIDTH, sum(heights)), layout="constrained")
-        fill(figure.subplots(len(heights), squeeze=False, height_ratios=heights)[:, 0])
+        fill(list(figure.subplots(len(heights), squeeze=False, height_ratios=heights)[:, 0]))
         drawn = io.BytesIO()
         figure.savefig(drawn, dpi=DPI, format="png")
     few = Image.open(drawn).convert("RGB").quantize(64, dither=Image.Dither.NONE)

@@ -12,7 +12,7 @@ from fdnet.cli import main
 from fdnet.errors import CaseError
 from fdnet.formation import handed_up
 from fdnet.formation.handed_up import fit_damage, fit_depths, hand_up
-from fdnet.formation.model import CakeOf, Column, Drive, march, steep_grid
+from fdnet.formation.model import CakeOf, Column, Flood, march, steep_grid
 from fdnet.formation.scale_up import API_AREA, _merged, core_flood, well_invasion
 from fdnet.run.finished import FinishedRun
 
@@ -78,7 +78,7 @@ def test_the_model_gives_a_specimen_its_own_profile_and_permeability_back(finish
     fines, kept = [], []
     for one in many:
         more = {"closing": one.closing, "cake": cake, "taps": edges}
-        made = march(column, one.rock, one.mud, [Drive(100.0, rate=area * 1e-3)], 1e-3, **more)
+        made = march(column, one.rock, one.mud, [Flood(100.0, rate=area * 1e-3)], 1e-3, **more)
         whole = np.append(0.0, np.cumsum(made.end.deposit.sum(axis=0) * column.volume))
         fines.append(np.diff(np.interp(edges, column.edges, whole)))
         kept.append(made.k_over_k0[-1])

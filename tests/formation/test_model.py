@@ -8,8 +8,8 @@ import pytest
 from fdnet.formation.model import (
     CakeOf,
     Column,
-    Drive,
     FineClass,
+    Flood,
     Release,
     Rock,
     cake_skin,
@@ -33,7 +33,7 @@ VISCOSITY = 1e-3
 def flood(column, mud, pore_volumes, *, rock=ROCK, **more):
     """At a constant rate of 1e-7 m3/s, for so many pore volumes."""
     seconds = pore_volumes * rock.porosity * column.volume.sum() / 1e-7
-    return march(column, rock, mud, [Drive(seconds=seconds, rate=1e-7)], VISCOSITY, **more)
+    return march(column, rock, mud, [Flood(seconds=seconds, rate=1e-7)], VISCOSITY, **more)
 
 
 @pytest.mark.parametrize("well", [np.inf, 0.05])
@@ -79,16 +79,18 @@ def test_the_langmuir_solution_is_met_with_first_order():
 def test_no_fines_are_lost_or_made():
     """Several classes, both directions, a cake: to 1e-12 of what was supplied."""
     mud = (FineClass("coarse", 0.01, 80.0, 5.0), FineClass("fine", 0.02, 2.0, -3.0))
-    drives = [Drive(seconds=3e4, pressure=2e5), Drive(seconds=3e4, pressure=-1e5)] * 2
+    drives = [Flood(seconds=3e4, pressure=2e5), Flood(seconds=3e4, pressure=-1e5)] * 2
     cake = CakeOf(porosity=0.4, permeability=1e-15)
-    for column in (CORE, Column(edges=steep_grid(0.3, 60, 1e-4), area=0.1, well=0.1)):
-        more = {"cake": cake, "closing": 0.05, "release": Release(share=0.6, rate=20.0)}
+    well = Column(edges=steep_grid(0.3, 60, 1e-4), area=0.1, well=0.1)
+    for column, closing in ((CORE, 0.05), (CORE, 0.5), (well, 0.05)):
+        more = {"cake": cake, "closing": closing, "release": Release(share=0.6, rate=20.0)}
         made = march(column, ROCK, mud, drives, VISCOSITY, **more)
         end = made.end
         where = end.kept(column, ROCK) + end.passed + end.returned
         assert end.supplied == pytest.approx(where, rel=1e-12)
         assert np.all(end.supplied > 0)
         assert np.all(end.returned > 0)
+        assert closing < 0.1 or end.passed[1] > 0.01 * end.supplied[1]
         assert min(end.suspended.min(), end.deposit.min()) >= 0
 
 
@@ -117,7 +119,7 @@ def test_the_face_closes_when_its_deposit_is_full():
 def test_a_cake_at_constant_pressure_is_ruths():
     """t / V is a line in V, of slope mu c0 / (2 dp k_c (1 - phi_c - c0)) per area (Ruth 1935)."""
     cake = CakeOf(porosity=0.4, permeability=1e-17)
-    drive = [Drive(seconds=3600.0, pressure=7e5)]
+    drive = [Flood(seconds=3600.0, pressure=7e5)]
     made = march(CORE, ROCK, MUD, drive, VISCOSITY, cake=cake, closing=0.0)
     v = made.filtrate[1:] / CORE.area
     slope, start = np.polyfit(v, made.time[1:] / v, 1)
@@ -156,7 +158,7 @@ def test_the_skin_of_a_cake_has_the_shapes_of_opm():
 
 
 def test_a_schedule_keeps_rate_and_pressure():
-    drives = [Drive(seconds=100.0, rate=1e-7), Drive(seconds=200.0, pressure=1e5)]
+    drives = [Flood(seconds=100.0, rate=1e-7), Flood(seconds=200.0, pressure=1e5)]
     made = march(CORE, ROCK, MUD, drives, VISCOSITY)
     first = made.time <= 100.0
     assert made.rate[first] == pytest.approx(1e-7, rel=1e-12)
@@ -168,10 +170,10 @@ def test_a_schedule_keeps_rate_and_pressure():
 
 def test_more_back_flow_returns_more_and_the_section_at_the_face_least():
     """The trend of Egermann (SCA 2001-25)."""
-    forth = Drive(seconds=6e4, rate=1e-7)
+    forth = Flood(seconds=6e4, rate=1e-7)
     returned = []
     for seconds in (0.0, 1e4, 3e4, 1e6):
-        back = [Drive(seconds=seconds, rate=-1e-7)] if seconds else []
+        back = [Flood(seconds=seconds, rate=-1e-7)] if seconds else []
         more = {"release": Release(share=0.8, rate=5.0), "taps": np.linspace(0.0, 0.1, 5)}
         returned.append(march(CORE, ROCK, MUD, [forth, *back], VISCOSITY, **more).k_over_k0[-1])
     assert np.all(np.diff(returned, axis=0) > 0)
@@ -183,9 +185,41 @@ def test_more_back_flow_returns_more_and_the_section_at_the_face_least():
 def test_a_cake_that_fills_the_well_ends_the_march():
     column = Column(edges=grid(0.01, 20), area=1.0, well=0.05, outer=100.0)
     cake = CakeOf(porosity=0.4, permeability=1e-11, shape="inward")
-    drive = [Drive(seconds=1e9, pressure=1e6)]
+    drive = [Flood(seconds=1e9, pressure=1e6)]
     made = march(column, ROCK, MUD, drive, VISCOSITY, cake=cake, closing=0.0)
     assert made.stopped == "full"
     solids = made.end.cake.sum()
     assert solids / (0.6 * 1.0 * 0.05 / 2) == pytest.approx(1.0, rel=0.06)
     assert made.time[-1] < 1e9
+
+
+CORES = """
+2.76 1.50 2.76 2.76 2.41 3.90 2.10 1.50 2.76 1.50 3.10 3.10 3.10 2.76
+2.33 7.37 1.77 2.53 5.17 2.44 7.98 5.34 2.78 7.51 2.52 2.29 2.61 2.78
+33.09 64.81 18.96 170.69 128.23 153.27 72.03 45.32 329.77 113.29 710.21 379.43 307.45 595.61
+.075 .0953 .1451 .2482 .2376 .2434 .2240 .2440 .2953 .0932 .3025 .2804 .2895 .2965
+2.22 39.6 1.18 2.12 10.26 1.40 28.52 17.41 2.39 41.35 1.741 1.477 1.895 2.39
+6.62 6.50 5.72 5.66 5.53 6.31 5.87 4.85 5.62 6.61 5.45 5.54 5.91 5.57
+"""
+"""Fourteen mud-filtrate cores of a public repository (rmmeister/mud-filtrate-invasion-modeling):
+pressure MPa, filtrate mL, k 1e-15 m2, porosity, cake k 1e-21 m2, depth cm."""
+
+
+def test_fourteen_cores_by_order_of_magnitude():
+    """Filtrate within a factor of 1.4 at 37.5 minutes, depth of a piston within one of 12.
+
+    The filtrate is no test: the cake's permeability was probably figured from it. The depths are
+    where the filtrate is 0.1 % of the inlet's, so they hold a dispersion that a piston has not.
+    """
+    rows = np.array([line.split() for line in CORES.split("\n")[1:-1]], float).T
+    solids, area = 40 / 2440, 20.42e-4
+    column = Column(edges=grid(0.1016, 20), area=area)
+    for pressure, filtrate, k, porosity, cake_k, depth in rows:
+        rock = Rock(porosity=porosity, permeability=k * 1e-15, damage=0.0)
+        cake = CakeOf(porosity=0.1, permeability=cake_k * 1e-21)
+        drive = [Flood(37.5 * 60, pressure * 1e6)]
+        mud = [FineClass("solids", solids, 0.0)]
+        made = march(column, rock, mud, drive, 1e-3, cake=cake, closing=0.0)
+        assert 1 / 1.4 < made.filtrate[-1] / (filtrate * 1e-6) < 1.4
+        piston = made.filtrate[-1] / (area * porosity * (1 - 0.3))
+        assert 1 / 12 < piston / (depth / 100) < 1.2

@@ -5,7 +5,7 @@ import pytest
 
 import fdnet
 from fdnet.network.fines.occupancy import measure_occupancy
-from validation.classes import added_resistance
+from validation.classes import added_resistance, arrival_table
 
 
 def added(scale: float, *, fines: int = 1) -> np.ndarray:
@@ -39,3 +39,14 @@ def test_added_resistance_of_a_fine_in_one_tetrahedron_by_hand():
     share = 4.0 / 3.0 * np.pi * 5e-5**3 / void
     expected = 1210.0 * share**2 / (1e-4 * void ** (1.0 / 3.0)) ** 1.5
     assert np.max(found) == pytest.approx(expected, rel=1e-4)
+
+
+def test_arrivals_are_counted_by_class_and_a_fresh_throat_is_a_class_of_its_own():
+    one = {"diameter_um": 100, "concentration": 0.1, "ratio": 0.7}
+    loads = [(0.0, False), (0.0, False), (0.0, True), (0.01, True), (0.01, False)]
+    rows = [one | {"load": load, "stopped": stopped} for load, stopped in loads]
+    table = arrival_table(rows)
+    assert table["arrivals"].tolist() == [3, 2]
+    assert table["stopped"].tolist() == [1, 1]
+    assert table["share_low"][0] < 1 / 3 < table["share_high"][0]
+    assert (table["ratio_lo"] == 0.65).all()
