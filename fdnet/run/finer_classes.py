@@ -35,7 +35,7 @@ from fdnet.classes.invasion import bed_of, cake_permeability, cake_resistance
 from fdnet.classes.transport import carry, streams_of
 from fdnet.files import replacing
 from fdnet.network.flow.flow import Flow
-from fdnet.run.network_flow import RENEWED, PackFlow
+from fdnet.run.network_flow import RENEWED, Narrowed, PackFlow
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
@@ -103,12 +103,8 @@ class FinerClasses:
     pressure: Array
     solved: float = 0.0
 
-    def among(self, passed: Passed, spheres: Stands) -> tuple[Array, bool]:
-        """Carry the classes on by what `passed`, among the `spheres` that stand.
-
-        Returns what all leave (T, 2) of the clean sides, and whether enough of the classes came to
-        rest since the last solve for another one.
-        """
+    def among(self, passed: Passed, spheres: Stands) -> Narrowed:
+        """Carry the classes on by what `passed`, among the `spheres` that stand."""
         step = passed.now - passed.before
         sieve = replace(
             self.sieve, passage=self.sieve.passage * np.min(spheres.factor, axis=1) ** 0.25
@@ -142,8 +138,9 @@ class FinerClasses:
         ]
         # loosely packed spheres among fine solids may seem to make room: they make none
         self.kept = np.minimum(left[0] / left[1], 1.0)
-        held = self._held
-        return spheres.factor * self.kept, held - self.solved > RENEWED * held
+        held, rest = self._held, self.solids.in_pores + self.solids.attached
+        grown = held - self.solved > RENEWED * held
+        return Narrowed(spheres.factor * self.kept, rest.sum(axis=1), grown)
 
     def _among(self, solids: Deposits, spheres: Stands) -> Deposits:
         """The solids with the standing spheres as the last class."""

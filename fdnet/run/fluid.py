@@ -31,6 +31,7 @@ from fdnet.run.finer_classes import (
 from fdnet.run.network_flow import (
     RENEWED,
     Carried,
+    Narrowed,
     PackFlow,
     Renewal,
     on_each_fine,
@@ -403,7 +404,7 @@ class NetworkFluid:
 
     def _among(
         self, moment: Moment, filtrate: float, stack: Standing, kept: Array, in_pores: Array
-    ) -> tuple[Array, bool]:
+    ) -> Narrowed:
         """What the finer solids leave of the sides that `kept` (T, 2) of their conductances."""
         assert self.finer is not None
         before = 0.0 if moment.before is None else moment.before["filtrate_m3"]

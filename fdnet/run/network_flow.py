@@ -164,10 +164,11 @@ class PackFlow:
             return former.changed_to(fines)
         return measured_sections(self.network, fines, parts=self.parts, step=STEP)
 
-    def carried(self, kept: Array, fines: Array) -> Carried:
+    def carried(self, kept: Array, fines: Array, finer: Array | None = None) -> Carried:
         """What the pores carry when the sides have `kept` (T, 2) of their clean conductances.
 
-        `fines` (P,) m3 is the volume of the fines in each pore.
+        `fines` (P,) m3 is the volume of the fines in each pore, `finer` (G,) m3 that of solids
+        beside them in groups of pores.
         """
         factor = np.maximum(kept, LEAK)
         raised = np.sum(self.halves / factor, axis=1)
@@ -180,17 +181,18 @@ class PackFlow:
             k_over_k0=flow.inflow / self.flow.inflow,
             ratio=np.divide(share, self.through, out=np.ones_like(share), where=moving),
             stagnant=int(np.sum(~moving)),
-            pressed=self._pressed(factor, flow, fines),
+            pressed=self._pressed(factor, flow, fines, finer),
             flow=flow,
         )
 
-    def _pressed(self, factor: Array, flow: Flow, fines: Array) -> Pressed:
+    def _pressed(self, factor: Array, flow: Flow, fines: Array, finer: Array | None) -> Pressed:
         """The forces in a `flow` on grains, and on fines in the pores.
 
         What the fines add to a side acts on those in its pore. A fine also narrows sides whose
         pores it does not reach: that acts on the fines in the pore behind the throat, and on the
         grains where that has none either. `factor` (T, 2) is the share that the sides keep of
-        their conductances, `fines` (P,) m3 the volume of the fines in each pore.
+        their conductances, `fines` (P,) m3 the volume of the fines in each pore. They bear what
+        acts on a pore by their share of its solids; `finer` ones hand theirs on to the grains.
         """
         first, second = flow.pore_pressure[self.network.throat_pores].T
         drop, raised = np.nan_to_num(first - second), self.halves / factor
@@ -201,6 +203,9 @@ class PackFlow:
         holding, pair = np.bincount(group, fines, count) > 0, group[self.network.throat_pores]
         pair = np.where(holding[pair], pair, pair[:, ::-1])
         on_fines *= holding[pair][..., None]
+        if finer is not None:
+            own = np.bincount(group, fines * self.network.pore_share, count)
+            on_fines *= ratio(own, own + finer)[pair][..., None]
         groups = _summed(pair.ravel(), on_fines.reshape(-1, 3), count)
         everything = drop @ self.facet_area
         return Pressed(frozen(everything - groups.sum(axis=0)), frozen(groups))
@@ -268,9 +273,23 @@ def pore_through(network: Network, flow: Flow) -> Array:
     return (np.maximum(into, out) / flow.inflow)[group]
 
 
-Narrowed = Callable[[Array, Array], tuple[Array, bool]]
-"""What solids finer than the spheres leave of the shares (T, 2) that sides with spheres keep, with
-the volumes (P,) m3 of these in the pores; and whether the network must be solved anew for it."""
+class Narrowed(NamedTuple):
+    """What solids finer than the spheres do.
+
+    Attributes:
+        kept: (T, 2) share of its clean conductance that all leave to a side.
+        volume: (G,) m3 at rest in groups of pores.
+        grown: whether the network must be solved anew for it.
+    """
+
+    kept: Array
+    volume: Array
+    grown: bool
+
+
+Finer = Callable[[Array, Array], Narrowed]
+"""What they do, from the shares (T, 2) that the spheres leave to the sides, and the volumes (P,)
+m3 of the spheres in the pores."""
 
 
 @dataclass(slots=True, eq=False)
@@ -296,7 +315,7 @@ class Renewal:
     solves: int = 0
 
     def of(
-        self, fines: Snapshot, *, anew: bool, finer: Narrowed | None = None
+        self, fines: Snapshot, *, anew: bool, finer: Finer | None = None
     ) -> tuple[Carried, KeptDeposit]:
         """What the pores carry with standing `fines`, which are `placed`.
 
@@ -314,11 +333,12 @@ class Renewal:
             self.carried, self.solved = None, inside
         assert self.sections is not None
         kept = self.sections.factor
+        volume = None
         if finer is not None:
-            kept, grown = finer(kept, self.deposit.in_pores)
+            kept, volume, grown = finer(kept, self.deposit.in_pores)
             self.carried = None if grown else self.carried
         if self.carried is None:
-            self.carried = pack.carried(kept, self.deposit.in_pores)
+            self.carried = pack.carried(kept, self.deposit.in_pores, volume)
             self.solves += 1
         return self.carried, self.deposit
 

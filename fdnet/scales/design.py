@@ -485,7 +485,7 @@ def _notes(design: Design) -> dict[str, str]:
             "Coarser solids are spheres in LIGGGHTS, and "
             f"{100 * case.fines.curve.below:.0f} % of the solids are finer: the pore network "
             f"carries these as size classes in the same flow. So {fits}. Lower it when you can "
-            f"wait longer; below {um(FINEST_OF_THROAT * throat)}, 1/7 of a throat, they pass."
+            f"wait; below {um(FINEST_OF_THROAT * throat)}, a seventh of a throat, they pass."
         )
     if choice.method == "network":
         notes["invasion.method"] = (

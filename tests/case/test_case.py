@@ -121,8 +121,12 @@ def test_every_table_is_written():
     assert set(KEYS) == set(InvasionCase.model_fields)
     well = "well={radius_mm=108.0, drainage_radius_m=100.0}"
     clean_up, bonds = "clean_up.drawdown_MPa=1.0", "bonds={radius_ratio=0.5}"
-    settings = (well, clean_up, bonds, 'fluid.viscosity="10 cP"')
-    assert list(tiny(*settings).data()) == list(KEYS)
+    settings = (well, bonds, 'fluid.viscosity="10 cP"', "invasion.classes=8")
+    written = list(tiny(*settings, clean_up).data())
+    cake = ("invasion.method=network", "cake.permeability_m2=1e-18")
+    written.insert(written.index("clean_up"), "cake")
+    assert written == list(KEYS)
+    assert "cake" in tiny(*settings, *cake).data()
     assert "given" not in tiny(well).data()
     assert {"fines", "fines.radius_mm"} <= set(known_keys())
     with pytest.raises(CaseError, match="name"):

@@ -6,10 +6,12 @@ from builders import followed
 from cut_and_continue import differences
 
 from fdnet.case.file import case_from
+from fdnet.classes.deposit import kept_shares
 from fdnet.dem.checkpoint import Checkpoints
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
+from fdnet.run.finer_classes import Passed, Stands
 from fdnet.run.fluid import fluid_of
 from fdnet.run.pipeline import run_case
 from fdnet.scales.scales import scales_of
@@ -110,6 +112,42 @@ def test_its_tables_hold_spheres_and_classes(whole):
     assert sections["fines_count"].sum() == summary["invaded_count"]
     assert np.all(sections["k_damaged_m2"] <= sections["k_initial_m2"])
     assert list(whole.pores.columns)
+
+
+@pytest.fixture(scope="module")
+def fluid(grains_of):
+    case = mud("both")
+    return fluid_of(case, scales_of(case), grains_of(case))
+
+
+def test_spheres_bear_a_pore_by_their_share_of_its_solids(fluid):
+    """With as much of finer solids beside them half of it, and the grains the other half."""
+    pack, network = fluid.pack, fluid.pack.network
+    spheres = 1e-3 * np.maximum(network.pore_volume, 0.0)
+    kept = np.full(pack.halves.shape, 0.3)
+    own = np.bincount(network.pore_group, spheres * network.pore_share)
+    alone, beside = (pack.carried(kept, spheres, finer).pressed for finer in (None, own))
+    assert beside.groups == pytest.approx(0.5 * alone.groups, rel=1e-12)
+    sums = [one.grains + one.groups.sum(axis=0) for one in (alone, beside)]
+    assert sums[0] == pytest.approx(sums[1], rel=1e-9, abs=1e-9 * network.area)
+
+
+def test_spheres_hold_classes_that_would_pass_without_them(fluid):
+    """A narrowed passage holds what is wider; what rests narrows the sides by the fast model."""
+    finer = fluid.finer
+    finer.forget()
+    none = np.zeros(len(fluid.pack.network.pore_group))
+    pores, held = float(finer.sieve.void.sum()), []
+    for factor in (1.0, 1e-6):
+        finer.forget()
+        sides = np.full(finer.kept.shape, factor)
+        left = finer.among(Passed(0.0, 0.5 * pores, 1e-3), Stands(sides, none, 0.0))
+        held.append(left.volume.sum())
+        own = kept_shares(finer.sieve, finer.solids, finer.own)
+        assert left.kept == pytest.approx(factor * own, rel=1e-9)
+        assert np.abs(finer.solids.missing).max() < 1e-12
+    assert held[1] > 1.5 * held[0]
+    finer.forget()
 
 
 def test_what_does_not_go_with_both_is_refused():
