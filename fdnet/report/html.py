@@ -212,7 +212,6 @@ class ReportParts:
         tables: further tables (`fdnet.report.figures.PageTable`), in order.
         stokes: the section on resolved Stokes flow, as HTML.
         mechanics: the section on the mechanics of the pack, as HTML.
-        formation: the section on a core and a well, as HTML.
     """
 
     figures: Sequence[tuple[Path, str]] = ()
@@ -224,7 +223,6 @@ class ReportParts:
     tables: Sequence[Any] = ()
     stokes: str = ""
     mechanics: str = ""
-    formation: str = ""
 
 
 def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:
