@@ -574,7 +574,8 @@ def judge_beads(rows: pd.DataFrame) -> list[Finding]:
             continue
         (left, half), (first, _) = own["k over k0"], own["first quarter"]
         band = f" ± {half:.2f}" if math.isfinite(half) else ""
-        seen = f"k/k₀ {left:.2f}{band}, {100 * first:.0f} % in the first quarter"
+        first_quarter = f"{100 * first:.0f} % of the deposit in the first quarter"
+        seen = f"k/k₀ {left:.2f}{band}, {first_quarter if left < 0.99 else 'all pass'}"
         even = abs(first - 0.25) / 0.15 if 0.05 < left < 0.99 else math.inf
         lines.append(Finding(what, number, source, seen, left / 0.05 if plug else even))
     return lines
