@@ -5,8 +5,8 @@
     .venv/bin/python scripts/validation.py list
 
 NAME runs a study, or goes on with it; `NAME --help` says what else it takes. Comparisons with
-commands of their own: accuracy, benchmark, truth, outside, mechanics, bridging, classes,
-size-classes, thesis.
+commands of their own: accuracy, benchmark, truth, outside, mechanics, scoreboard, bridging,
+closures, size-classes, both, thesis.
 """
 
 import sys
@@ -23,7 +23,7 @@ CHAPTERS: dict[str, str] = {
     "mechanics": "validation.mechanics",
     "scoreboard": "validation.scoreboard",
     "bridging": "validation.bridging",
-    "classes": "validation.classes",
+    "closures": "validation.closures",
     "size-classes": "validation.size_classes",
     "thesis": "validation.thesis.command",
 }

@@ -177,7 +177,7 @@ def test_the_pages_that_the_code_writes_are_up_to_date():
 
 def test_the_import_graph_is_small_and_has_layers():
     nodes, edges = import_graph.nodes_of(ROOT), import_graph.edges_of(ROOT)
-    assert (len(nodes) <= 21, len(edges) <= 90) == (True, True)
+    assert (len(nodes) <= 22, len(edges) <= 90) == (True, True)
     assert max(import_graph.layers_of(nodes, edges).values()) < 10
     assert import_graph.layers_of({"a", "b", "c"}, {("b", "a"), ("c", "a"), ("c", "b")})["c"] == 2
     with pytest.raises(ValueError, match="cycle"):

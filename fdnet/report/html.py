@@ -146,21 +146,21 @@ def formation_html(folder: Path) -> str:
 
     Raises CaseError where a file cannot be understood.
     """
-    parts, notes, advice = list[str](), list[str](), "call fdnet core or fdnet well again"
+    found, notes, advice = [], list[str](), "call fdnet core or fdnet well again"
     for name, noun in (("well", "A well"), ("core", "A core")):
         if (path := folder / f"{name}.json").is_file():
-            found = read_json(path, _ScaledUp, noun=f"result of fdnet {name}", advice=advice)
-            said = "</p><p>".join(map(words, found["words"]))
-            parts.append(f"<h3>{noun}</h3><p>{said}</p>")
-            notes += found["warnings"]
-    figure = folder / "handed_up.svg"
-    if figure.is_file():
-        parts.append(
-            f'<figure><img src="{_data_uri(figure)}" alt="fit over the profile"></figure>'
-        )
-    items = "".join(f"<li>{words(text)}</li>" for text in dict.fromkeys(notes))
-    parts += [f'<div class="warnings"><ul>{items}</ul></div>'] if items else []
-    return _folded("From the face to a core and a well", "\n".join(parts)) if parts else ""
+            one = read_json(path, _ScaledUp, noun=f"result of fdnet {name}", advice=advice)
+            found.append((noun, one["words"]))
+            notes += one["warnings"]
+    if not found:
+        return ""
+    figure, caption = folder / "handed_up.svg", "the fit over the profile that it comes from"
+    return page_text(
+        "report/formation.html.j2",
+        found=found,
+        notes=list(dict.fromkeys(notes)),
+        figure=shown_figure(figure, caption) if figure.is_file() else None,
+    )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -212,7 +212,6 @@ class ReportParts:
         tables: further tables (`fdnet.report.figures.PageTable`), in order.
         stokes: the section on resolved Stokes flow, as HTML.
         mechanics: the section on the mechanics of the pack, as HTML.
-        formation: the section on a core and a well, as HTML.
     """
 
     figures: Sequence[tuple[Path, str]] = ()
@@ -224,7 +223,6 @@ class ReportParts:
     tables: Sequence[Any] = ()
     stokes: str = ""
     mechanics: str = ""
-    formation: str = ""
 
 
 def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:

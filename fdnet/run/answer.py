@@ -85,7 +85,12 @@ def steps_of(analysis: "Analysis") -> list[Step]:
     behind = [one for one in whole if one.near >= end * (1 - _TOUCH)]
     cut = [one for one in whole if one.near < end * (1 - _TOUCH) < end * (1 + _TOUCH) < one.far]
     for one in cut:
-        inside = [layer for layer in thin if layer.near >= one.near - _TOUCH * end]
+        # a layer that begins before the section counts with the part that lies in it
+        inside = [
+            layer._replace(near=max(layer.near, one.near))
+            for layer in thin
+            if layer.far > one.near + _TOUCH * end
+        ]
         before = _rest(one, one.before, inside, [layer.before for layer in inside])
         after = _rest(one, one.after, inside, [layer.after for layer in inside])
         if before is None or after is None:

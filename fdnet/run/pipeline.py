@@ -472,6 +472,5 @@ def _write_page(
         tables=[one.page for one in results.added if one.page is not None],
         stokes=report_section(session.path, case, summary),
         mechanics=html.mechanics_html(session.path / "mechanics"),
-        formation=html.formation_html(session.path / "formation"),
     )
     html.write_report(session.path / "report.html", summary, parts=parts)

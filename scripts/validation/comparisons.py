@@ -253,7 +253,7 @@ def command(name: str, chapter: Chapter, arguments: Sequence[str]) -> int:
     lines = findings(comparisons, rows)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / f"{name}.md", table(lines))
-    heights = (0.4 * len(lines) + 0.6, 4.0)
+    heights = (0.36 * sum(not math.isnan(line.over) for line in lines) + 1.0, 4.0)
     figure = Figure(figsize=(5.2, sum(heights)), layout="constrained", dpi=130)
     above, below = figure.subplots(2, height_ratios=heights)
     draw_differences(above, lines)

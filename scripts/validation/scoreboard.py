@@ -122,7 +122,7 @@ def judge_filtered(rows: pd.DataFrame) -> list[Finding]:
             held, fines = every[ratio]
             low, high = band_of(held, fines)
             of = "D" if sand == "equal" else "D10"
-            what = f"1: {NAMED[sand]}, fines of {of}/{ratio:g} held, friction {friction}"
+            what = f"1: {NAMED[sand]} {of}/{ratio:g}, friction {friction}"
             seen = f"{held / fines:.3f}, {low:.3f} to {high:.3f}, in {LENGTHS[sand][0]} mm"
             over = (1 - high) / 0.01 if all_held else low / 0.01
             number = "1 (99 % or more)" if all_held else "0 (at most 1 %)"
@@ -130,7 +130,7 @@ def judge_filtered(rows: pd.DataFrame) -> list[Finding]:
     return lines
 
 
-NAMED = {"equal": "equal spheres", "sieved": "20-40 mesh sand"}
+NAMED = {"equal": "equal spheres hold", "sieved": "20-40 mesh sand holds"}
 
 # ---- Rows 6 and 7. What single grains catch: the closed form, and tracers in resolved flow.
 
@@ -222,7 +222,7 @@ def judge_collected(rows: pd.DataFrame) -> list[Finding]:
     if len(caught):
         law = by_interception(0.02 * PAPER.diameter, PAPER)
         mean, half = mean_band(caught.observed / law)
-        what = "6: tracers of 0.02 D over η₀'s part by interception, 10 µm"
+        what = "6: tracers of 0.02 D over η₀'s interception"
         seen, over = (
             f"{mean:.2f} ± {half:.2f}, {len(caught)} packs",
             math.log(mean) / math.log(1.5),
@@ -240,7 +240,7 @@ def judge_intercepted(rows: pd.DataFrame) -> list[Finding]:
             continue
         law = 1.5 * happel(0.40) * value**2
         mean, half = mean_band(own.observed / law)
-        what = f"7: interception of tracers of {value:g} D, over Happel's 1.5 A_s (d/D)²"
+        what = f"7: tracers of {value:g} D over 1.5 A_s (d/D)²"
         seen = f"{mean:.2f} ± {half:.2f}, {len(own)} packs"
         source, over = "Happel 1958, Yao and others 1971", math.log(mean) / math.log(1.5)
         lines.append(Finding(what, "1, within a factor of 1.5", source, seen, over))
@@ -287,7 +287,7 @@ def judge_lattice(rows: pd.DataFrame) -> list[Finding]:
         if len(own):
             seen = f"network {own['network']:.1f}, resolved {own['resolved']:.1f}"
             off = max(abs(own["network"] / number - 1), abs(own["resolved"] / number - 1))
-            what, source = f"8: drag of one cell of {name}, K", "Zick and Homsy 1982"
+            what, source = f"8: drag K of one cell of {name}", "Zick and Homsy 1982"
             lines.append(Finding(what, f"{number:g} ± 2 %", source, seen, off / 0.02))
     return lines
 
@@ -312,7 +312,7 @@ def judge_surface(rows: pd.DataFrame) -> list[Finding]:
     if rows.empty:
         return []
     mean, half = mean_band(rows.observed)
-    what = "9: sand pack LV60A, k of equal spheres of its surface and porosity, D"
+    what = "9: LV60A, spheres of its surface, k in D"
     seen = f"{mean:.1f} ± {half:.1f}, {len(rows)} packs"
     note = "cannot be tried yet: its grains are an image, not spheres"
     return [Finding(what, "36.6", "Talabi 2008", seen, math.nan, note)]
@@ -391,11 +391,11 @@ def tortuosity(trial: Trial) -> Seen:
 def judge_tortuosity(rows: pd.DataFrame) -> list[Finding]:
     """The power by both ways, with the bands of the means over the packs."""
     lines = []
-    for quantity, label in (("n by ways", "the ways of the flow"), ("n by k", "k")):
+    for quantity, label in (("n by ways", "ways"), ("n by k", "k")):
         own = rows[(rows.quantity == quantity) & (rows.value > 10)]
         for value, some in own.groupby("value"):
             mean, half = mean_band(some.observed)
-            what = f"10: beads of 1 and 1/{value:g}, n of tortuosity ε⁻ⁿ by {label}"
+            what = f"10: beads {value:g} to 1, n of ε⁻ⁿ by {label}"
             seen, over = f"{mean:.3f} ± {half:.3f}, {len(some)} packs", (mean - 0.45) / 0.05
             lines.append(Finding(what, "0.4 to 0.5", "Dias and others 2008", seen, over))
     return lines
@@ -409,7 +409,7 @@ def ball_between(place: Array, radius: Array, low: float, high: float) -> Array:
 
     def below(plane: float) -> Array:
         height = np.clip(plane - place, -radius, radius)
-        return math.pi * (radius**2 * height - height**3 / 3 + 2 * radius**3 / 3)
+        return math.pi * (radius**2 * height - height**3 / 3)
 
     return np.asarray(below(high) - below(low))
 
@@ -443,7 +443,7 @@ def judge_clogging_number(rows: pd.DataFrame) -> list[Finding]:
     lines = []
     for value, own in rows.groupby("value"):
         seen = own.set_index("quantity").observed
-        what = f"14: γ of k/k₀ = (1 + γσ)⁻², fines of D/{value:g}, is one number at all σ"
+        what = f"14: γ of fines of D/{value:g} at all σ"
         says = f"{seen['gamma, median']:.1f}, {seen['gamma, lower quartile']:.1f} to "
         says += f"{seen['gamma, upper quartile']:.1f} (half of {seen['slabs']:.0f} slabs); "
         says += f"rank correlation with σ {seen['rank correlation']:.2f}"
@@ -452,7 +452,7 @@ def judge_clogging_number(rows: pd.DataFrame) -> list[Finding]:
             if seen["rank correlation"] > 0
             else 0.0
         )
-        lines.append(Finding(what, "no trend with σ", "Mays and Hunt 2005", says, over))
+        lines.append(Finding(what, "k/k₀ = (1 + γσ)⁻², one γ", "Mays and Hunt 2005", says, over))
     return lines
 
 
@@ -526,13 +526,13 @@ BEADS = {"plug": ((0.177, 0.210), 900.0), "plateau": ((0.250, 0.297), 450.0)}
 
 
 def beads(trial: Trial) -> Seen:
-    """k/k0 of 20 grains of sand, and its first quarter's share of the deposit.
+    """k/k0 of 4 mm of sand, and its first quarter's share of the deposit.
 
     Twenty pore volumes of water bring half a percent of beads of 5 to 10 um at constant pressure,
     as size classes on the network. The concentration of the experiment is not known to us.
     """
     (low, high), gradient = BEADS[trial.value]
-    length, side = 10 * (low + high), 2.5 * (low + high)
+    length, side = 4.0, 2.5 * (low + high)
     sieved = {"cut_percent": [0.0, 100.0], "passing_percent": [0.0, 100.0]}
     tables = {
         "name": "beads",
@@ -566,14 +566,15 @@ def judge_beads(rows: pd.DataFrame) -> list[Finding]:
     for value, ((low, high), gradient) in BEADS.items():
         own = rows[rows.value == value].groupby("quantity")["observed"].apply(mean_band)
         grains = f"{1e3 * low:.0f}-{1e3 * high:.0f} µm, {gradient:g} kPa/m"
-        what = f"3: beads of 5-10 µm in sand of {grains}"
+        what = f"3: beads of 5-10 µm in {grains}"
         plug = value == "plug"
         number = "deposit at the inlet, k → 0" if plug else "even deposit, k to a plateau"
         if own.empty:
             lines.append(Finding(what, number, source, "-", math.nan, LATER))
             continue
-        (left, band), (first, _) = own["k over k0"], own["first quarter"]
-        seen = f"k/k₀ {left:.2f} ± {band:.2f}, {100 * first:.0f} % in the first quarter"
+        (left, half), (first, _) = own["k over k0"], own["first quarter"]
+        band = f" ± {half:.2f}" if math.isfinite(half) else ""
+        seen = f"k/k₀ {left:.2f}{band}, {100 * first:.0f} % in the first quarter"
         even = abs(first - 0.25) / 0.15 if 0.05 < left < 0.99 else math.inf
         lines.append(Finding(what, number, source, seen, left / 0.05 if plug else even))
     return lines
@@ -586,8 +587,8 @@ def judge_rate(rows: pd.DataFrame) -> list[Finding]:
         slow, fast = (replace(PAPER, diameter=grain, velocity=0.4 * u) for u in (0.0066, 0.0095))
         rates = [bed.velocity * efficiency(8e-6, 2710.0, bed) for bed in (slow, fast)]
         ratios.append(rates[1] / rates[0])
-    what = "4: CaCO₃ in sand of 840-2000 µm, rate constant at 0.95 over 0.66 cm/s"
-    seen = f"{min(ratios):.3f} to {max(ratios):.3f}, grains of 2 to 0.84 mm"
+    what = "4: CaCO₃, rate at 0.95 over 0.66 cm/s"
+    seen = f"{min(ratios):.3f} to {max(ratios):.3f}, sand of 2 to 0.84 mm"
     over = max(abs(one - 1) for one in ratios) / 0.1
     return [Finding(what, "1 ± 10 %", "Gruesbeck and Collins 1982", seen, over)]
 
@@ -605,9 +606,9 @@ def judge_strained(rows: pd.DataFrame) -> list[Finding]:
 
 def judge_read(rows: pd.DataFrame) -> list[Finding]:
     """What else could be read: fines in packs, and deposits at contacts of grains."""
-    what = "15: 36 µm spheres that stick in beads of 710-850 µm, share at contacts of two beads"
+    what = "15: 36 µm that stick in beads of 710-850 µm"
     note = "cannot be tried yet: tracers stick where they first touch"
-    last = Finding(what, "about 20 %", "Li and others 2006", "-", math.nan, note)
+    last = Finding(what, "20 % touch two beads", "Li and others 2006", "-", math.nan, note)
     return [*numbered(15, "outside", "arXiv"), last]
 
 

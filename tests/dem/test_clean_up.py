@@ -64,7 +64,7 @@ def start(run):
         case=case, scales=scales_of(case), folder=held, options=RunOptions(out=folder)
     )
     grains = packed_grains(session)
-    damaged = invaded(session, case, grains, invasion_record(session, case)).state
+    damaged = invaded(session, case, grains, invasion_record(session, case)).damaged
     held.close()
     return Start(grains=grains, invaded=damaged, invasion=folder / "invade", digest="test")
 

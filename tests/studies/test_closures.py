@@ -5,7 +5,7 @@ import pytest
 
 import fdnet
 from fdnet.network.fines.occupancy import measure_occupancy
-from validation.classes import added_resistance, arrival_table
+from validation.closures import added_resistance, arrival_table
 
 
 def added(scale: float, *, fines: int = 1) -> np.ndarray:

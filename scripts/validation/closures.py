@@ -1,10 +1,9 @@
-"""What the network model of size classes is held to, from finished runs of spheres.
+"""What the laws of the size classes are measured on, from finished runs of spheres.
 
-    python scripts/validation.py classes RUN... --references classes_reference.csv
-    python scripts/validation.py classes RUN... --closure classes_closure.csv
-    python scripts/validation.py classes RUN... --arrivals classes_arrivals.csv
+    python scripts/validation.py closures RUN... --closure classes_closure.csv
+    python scripts/validation.py closures RUN... --arrivals classes_arrivals.csv
 
-`--references` writes one row a case, seed and quantity. `--closure` cuts runs into slabs of a
+`--closure` cuts runs into slabs of a
 millimetre and gives their permeability with fines by the network of all spheres, the reference,
 and, on that of the grains, by the resistance a deposit adds, by sections and by the thesis's law.
 `--arrivals` follows fines of one size and counts which throats wider than they are stop them; it
@@ -60,29 +59,6 @@ def added_resistance(network: Network, occupancy: Occupancy, *, factor: float = 
     size = 6.0 * volume[held] / surface[held]
     added[held] = factor * (volume[held] / void) ** 2 / (size * np.cbrt(void)) ** 1.5
     return added[network.throat_pores]
-
-
-def reference_rows(run: FinishedRun) -> Iterator[dict[str, Any]]:
-    """One row a quantity of a run."""
-    summary, profile = run.summary, run.profile
-    names = ("supplied_count", "invaded_count", "passed_count", "upstream_count")
-    values = {name.removesuffix("_count"): summary[name] for name in names} | {
-        "k_over_k0": 1.0 - summary["k_reduction"],
-        "depth_p95_mm": 1e3 * summary["invasion_depth_p95_m"],
-        "cake_mm": 1e3 * summary["cake_thickness_m"],
-        "filtrate_mm3": 1e9 * summary["filtrate_m3"],
-        "liggghts_cpu_s": summary["cpu_seconds"]["liggghts"],
-        "python_cpu_s": summary["cpu_seconds"]["python"],
-    }
-    for section in summary["sections"]:
-        number = section["section"]
-        values[f"k0_m2_section_{number}"] = section["k_initial_m2"]
-        values[f"k_over_k0_section_{number}"] = 1.0 - section["k_reduction"]
-        values[f"fines_section_{number}"] = section["fines_count"]
-    for deep, share in zip(profile["x_hi_m"], profile["fines_fraction"], strict=True):
-        values[f"fines_to_{1e3 * float(deep):.2f}_mm"] = round(share * summary["invaded_count"])
-    for name, value in values.items():
-        yield {"case": run.case.name, "seed": summary["seed"], "quantity": name, "value": value}
 
 
 def closure_rows(run: FinishedRun) -> Iterator[dict[str, Any]]:
@@ -198,10 +174,10 @@ def arrival_table(rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The command `validation.py classes`."""
-    parser = argparse.ArgumentParser(prog="validation.py classes", description=__doc__)
+    """The command `validation.py closures`."""
+    parser = argparse.ArgumentParser(prog="validation.py closures", description=__doc__)
     parser.add_argument("runs", nargs="+", type=path_option, metavar="RUN_DIR")
-    tables = {"references": reference_rows, "closure": closure_rows, "arrivals": arrivals}
+    tables = {"closure": closure_rows, "arrivals": arrivals}
     for name in tables:
         parser.add_argument(f"--{name}", type=path_option, help="write this table")
     given = parser.parse_args(arguments)
