@@ -238,7 +238,8 @@ def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
     final = "final" if summary["final"] else "not final"
     yield f"The result is {final}, because {summary['words']['end']}."
     if "method_error" in summary:
-        yield f"It is by the fast model of size classes: {summary['method_error']}."
+        what = "It is" if summary["method"] == "network" else "What is finer than the cut is"
+        yield f"{what} by the fast model of size classes: {summary['method_error']}."
     scatter = summary.get("scatter")
     if scatter and summary.get("invaded_count") and summary["final"]:
         own = "" if summary["case"] in scatter["source"] else ", and not of this case"

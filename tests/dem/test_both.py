@@ -111,7 +111,12 @@ def test_its_tables_hold_spheres_and_classes(whole):
     sections = whole.sections
     assert sections["fines_count"].sum() == summary["invaded_count"]
     assert np.all(sections["k_damaged_m2"] <= sections["k_initial_m2"])
-    assert list(whole.pores.columns)
+    filled = whole.profile.porosity_initial - whole.profile.porosity_damaged
+    width = whole.profile.x_hi_m - whole.profile.x_lo_m
+    area = whole.case.size_m[1] * whole.case.size_m[2]
+    inside = summary["invaded_volume_m3"]
+    assert float(filled @ width) * area == pytest.approx(inside, rel=0.1)
+    assert sum(one["inside_m3"] for one in summary["classes"]) < inside
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from builders import tiny
 
+from fdnet.classes.invasion import cake_permeability
 from fdnet.errors import CaseError
-from fdnet.run.by_classes import cake_permeability
 from fdnet.run.finished import open_run
 from fdnet.run.pipeline import run_case
 
