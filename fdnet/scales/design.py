@@ -432,9 +432,10 @@ def _comment(text: str) -> list[str]:
 
 def _top(design: Design) -> str:
     answers, curve = design.answers, design.case.fines.curve
-    median = um(curve.size_at((0.5 - curve.below) / curve.kept)) if curve.below < 0.5 else ""
+    half = "" if curve.below >= 0.5 else um(curve.size_at((0.5 - curve.below) / curve.kept))
+    half = half or answers.get("mud_d50", "")
     return (
-        f"A mud of {answers['solids']} solids (half of them below {median or 'the solids'}) at a "
+        f"A mud of {answers['solids']} solids{f' (half of them below {half})' * bool(half)} at a "
         f"sand of {answers['porosity']} porosity, {answers['overbalance']} over the formation. "
         f"Written by fdnet init, size {design.budget.name}: the run is expected to take "
         f"{spoken_time(design.seconds)} on one core. fdnet check looks at it, fdnet run runs it."
