@@ -15,23 +15,23 @@ from typing import NamedTuple
 import numpy as np
 
 from fdnet.case.case import InvasionCase
+from fdnet.classes.beside_spheres import (
+    CLASS_COLUMNS,
+    FinerClasses,
+    Narrowed,
+    Passed,
+    Stands,
+    finer_classes,
+)
 from fdnet.dem.checkpoint import Checkpoint, entered_by, time_of
 from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
 from fdnet.run.cake import Standing, standing_cake
-from fdnet.run.finer_classes import (
-    CLASS_COLUMNS,
-    FinerClasses,
-    Passed,
-    Stands,
-    finer_classes,
-)
 from fdnet.run.network_flow import (
     RENEWED,
     Carried,
-    Narrowed,
     PackFlow,
     Renewal,
     on_each_fine,
@@ -264,8 +264,10 @@ class NetworkFluid:
     @cached_property
     def finer(self) -> FinerClasses | None:
         """The solids finer than the cut, from one update to the next; None without any."""
-        case = self.case
-        return finer_classes(case, self.scales, self.pack) if case.with_classes else None
+        if not self.case.with_classes:
+            return None
+        pack = self.pack
+        return finer_classes(self.case, self.scales, pack.network, pack.halves, pack.flow)
 
     def keep(self, path: Path) -> None:
         """Write what the next update needs of the finer solids."""

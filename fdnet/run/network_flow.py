@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fdnet.classes.beside_spheres import Narrowed
 from fdnet.network import geometry
 from fdnet.network.field.field import VelocityField, velocity_field
 from fdnet.network.fines.deposit import (
@@ -271,20 +272,6 @@ def pore_through(network: Network, flow: Flow) -> Array:
     into = np.bincount(second, forth, count) + np.bincount(first, back, count)
     out = np.bincount(first, forth, count) + np.bincount(second, back, count)
     return (np.maximum(into, out) / flow.inflow)[group]
-
-
-class Narrowed(NamedTuple):
-    """What solids finer than the spheres do.
-
-    Attributes:
-        kept: (T, 2) share of its clean conductance that all leave to a side.
-        volume: (G,) m3 at rest in groups of pores.
-        grown: whether the network must be solved anew for it.
-    """
-
-    kept: Array
-    volume: Array
-    grown: bool
 
 
 Finer = Callable[[Array, Array], Narrowed]

@@ -34,6 +34,9 @@ cache."""
 UPDATE_SECONDS = (0.03, 9.0e-5)
 """Seconds of one update of the flow that follows the deposit: at least, and for each grain and
 fine."""
+BESIDE_CLASSES = (5, 2)
+"""Steps beside finer classes over those without, because springs are stiffened for what presses
+the spheres, and seconds of updates over those without."""
 FALLING_RATE = 0.6
 """Mean rate over the first, where the deposit slows the flow."""
 WAITING, TRICKLING = 2.0, 1.4
@@ -97,6 +100,9 @@ def cost_of(case: Case, scales: Scales) -> Cost:
         updates = count * (least + each * (grains + fines))
     grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
     fine = FINE_SECONDS[drag.scheme] * (1 + fines / (fines + CACHED_FINES))
+    if case.with_classes:
+        more, again = BESIDE_CLASSES
+        steps, updates = more * steps, again * updates
     return Cost(
         pack_seconds=pack,
         invade_seconds=steps * (STEP_SECONDS + grains * grain + fines * fine) + updates,

@@ -6,12 +6,12 @@ from builders import followed
 from cut_and_continue import differences
 
 from fdnet.case.file import case_from
+from fdnet.classes.beside_spheres import Passed, Stands
 from fdnet.classes.deposit import kept_shares
 from fdnet.dem.checkpoint import Checkpoints
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
-from fdnet.run.finer_classes import Passed, Stands
 from fdnet.run.fluid import fluid_of
 from fdnet.run.pipeline import run_case
 from fdnet.scales.scales import scales_of

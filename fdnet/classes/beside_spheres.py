@@ -35,12 +35,16 @@ from fdnet.classes.invasion import bed_of, cake_permeability, cake_resistance
 from fdnet.classes.transport import carry, streams_of
 from fdnet.files import replacing
 from fdnet.network.flow.flow import Flow
-from fdnet.run.network_flow import RENEWED, Narrowed, PackFlow
+from fdnet.network.network import Network
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
 CLASS_COLUMNS = ("classes_inside_m3", "classes_passed_m3", "classes_cake_m3", "classes_missing")
 """Volume of all classes in the specimen, beyond it and before it; error of their ledger."""
+
+
+CHANGED = 0.2
+"""Share of the classes at rest that may come before the network is solved anew."""
 
 
 class Passed(NamedTuple):
@@ -71,12 +75,26 @@ class Stands(NamedTuple):
     cake: float
 
 
+class Narrowed(NamedTuple):
+    """What solids finer than the spheres do.
+
+    Attributes:
+        kept: (T, 2) share of its clean conductance that all leave to a side.
+        volume: (G,) m3 at rest in groups of pores.
+        grown: whether the network must be solved anew for it.
+    """
+
+    kept: Array
+    volume: Array
+    grown: bool
+
+
 @dataclass(slots=True, eq=False, kw_only=True)
 class FinerClasses:
     """Where the finer classes (C) are, from one update to the next.
 
     Attributes:
-        pack: the intact pack, with pores in N groups and throats (T).
+        network: of the grains, with pores in N groups and throats (T).
         sieve: the same as solids meet it.
         classes: (C) and, as the last one, the spheres.
         bed: grains and fluid, for what sticks to them.
@@ -90,7 +108,7 @@ class FinerClasses:
         solved: m3 of them that the last solve knew.
     """
 
-    pack: PackFlow
+    network: Network
     sieve: Sieve
     classes: SizeClasses
     bed: Bed
@@ -139,12 +157,12 @@ class FinerClasses:
         # loosely packed spheres among fine solids may seem to make room: they make none
         self.kept = np.minimum(left[0] / left[1], 1.0)
         held, rest = self._held, self.solids.in_pores + self.solids.attached
-        grown = held - self.solved > RENEWED * held
+        grown = held - self.solved > CHANGED * held
         return Narrowed(spheres.factor * self.kept, rest.sum(axis=1), grown)
 
     def _among(self, solids: Deposits, spheres: Stands) -> Deposits:
         """The solids with the standing spheres as the last class."""
-        network, columns = self.pack.network, {}
+        network, columns = self.network, {}
         inside = spheres.in_pores * network.pore_share
         standing = {
             "in_pores": np.bincount(network.pore_group, inside, len(self.sieve.void)),
@@ -164,7 +182,7 @@ class FinerClasses:
         """Take the `flow` of the last solve."""
         if self.flux is flow.throat_flux:
             return
-        first = np.unique(self.pack.network.pore_group, return_index=True)[1]
+        first = np.unique(self.network.pore_group, return_index=True)[1]
         self.flux, self.pressure = flow.throat_flux, flow.pore_pressure[first]
         self.solved = self._held
 
@@ -220,9 +238,12 @@ def without_last(classes: SizeClasses) -> SizeClasses:
 
 
 def finer_classes(
-    case: InvasionCase, scales: InvasionScales, pack: PackFlow
+    case: InvasionCase, scales: InvasionScales, network: Network, halves: Array, flow: Flow
 ) -> FinerClasses | None:
-    """What is finer than the cut of a case before its mud comes; None where nothing is."""
+    """What is finer than the cut of a case before its mud comes; None where nothing is.
+
+    `halves` (T, 2) 1/m3 are the resistances of the clean sides, `flow` is through these.
+    """
     choices, fines = case.invasion, case.fines
     if choices is None:
         return None
@@ -237,9 +258,9 @@ def finer_classes(
         "density": fines.mean_density_kg_m3,
     }
     classes = {name: np.append(getattr(finer, name), one) for name, one in coarse.items()}
-    sieve = sieve_of(pack.network, pack.halves, pack.flow.throat_flux)
+    sieve = sieve_of(network, halves, flow.throat_flux)
     made = FinerClasses(
-        pack=pack,
+        network=network,
         sieve=sieve,
         classes=SizeClasses(**classes),
         bed=bed_of(case, scales, scales.darcy_velocity),
@@ -251,5 +272,5 @@ def finer_classes(
         flux=np.zeros(0),
         pressure=np.zeros(0),
     )
-    made.solve(pack.flow)
+    made.solve(flow)
     return made
