@@ -25,6 +25,7 @@ CHAPTERS: dict[str, str] = {
     "bridging": "validation.bridging",
     "closures": "validation.closures",
     "size-classes": "validation.size_classes",
+    "both": "validation.both",
     "thesis": "validation.thesis.command",
 }
 """Name and module of the comparisons with a command of their own, `main(arguments) -> int`.

@@ -1,12 +1,11 @@
 """One mud with its cut moved: all spheres, spheres above the median, none.
 
-    python -m validation.both --out studies/both --seeds 8
-
 Writes cuts.csv: a row for each seed and cut, with what is left of the permeability of the
 specimen and of its halves. Runs that are there are not repeated.
 """
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -50,17 +49,14 @@ def row_of(seed: int, name: str, out: Path) -> dict[str, object]:
     }
 
 
-def main() -> None:
+def main(arguments: Sequence[str]) -> int:
     """Run all, seed after seed, and write what is there so far after each."""
-    parser = argparse.ArgumentParser(description="One mud with its cut moved.")
+    parser = argparse.ArgumentParser(prog="validation.py both", description=__doc__)
     parser.add_argument("--out", type=path_option, default=Path("studies/both"))
     parser.add_argument("--seeds", type=int, default=8)
-    options = parser.parse_args()
+    options = parser.parse_args(list(arguments))
     rows = []
     for seed in range(1, options.seeds + 1):
         rows += [row_of(seed, name, options.out) for name in CUTS]
         pd.DataFrame(rows).to_csv(options.out / "cuts.csv", index=False, float_format="%.4g")
-
-
-if __name__ == "__main__":
-    main()
+    return 0
