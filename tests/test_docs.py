@@ -25,7 +25,14 @@ WORKPLACE = re.compile(
 )
 """A path of one machine, or a host that only its owner reaches."""
 NOW_AND_THEN = {
-    *("method", "method_error", "classes", "mass_missing", "api_filtrate_mL"),  # the fast model
+    *(
+        "method",
+        "method_error",
+        "classes",
+        "mass_missing",
+        "api_filtrate_mL",
+        "cake_of_classes_1_m",
+    ),  # the fast model
     *("k_moved_m2", "sizes", "skin", "skin_flow_lost", "skin_well_radius_m", "drag_updates"),
     *("drag_last_update", "rate_over_initial", "filtrate_m3", "cake_resistance_share"),
     *("momentum_defect_most", "spurt_m3_m2", "volume_30min_m3_m2", "filtrate_fit"),
