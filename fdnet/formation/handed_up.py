@@ -129,7 +129,7 @@ class HandedUp:
 
 
 def hand_up(source: str | Path | FinishedRun, *, classes: int = 1) -> list[HandedUp]:
-    """What a run hands up, with `DRAWS` draws within its errors behind; of an ensemble each run.
+    """What a run hands up, in SI units; behind it `DRAWS` draws within its errors, or other seeds.
 
     Args:
         source: a run, its folder, or the folder of an ensemble.
