@@ -23,16 +23,15 @@ from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient, mud_clas
 from fdnet.classes.deposit import (
     Deposits,
     Sieve,
-    fluid_void,
+    advanced,
     holding,
     kept_shares,
     no_solids,
-    settled,
     sieve_of,
     thickness_of_cake,
 )
 from fdnet.classes.invasion import bed_of, cake_permeability, cake_resistance
-from fdnet.classes.transport import carry, streams_of
+from fdnet.classes.transport import streams_of
 from fdnet.files import replacing
 from fdnet.network.flow.flow import Flow
 from fdnet.network.network import Network
@@ -137,15 +136,7 @@ class FinerClasses:
             bed = replace(self.bed, velocity=passed.velocity)
             sticks = filter_coefficient(classes, bed, self.sticking)
             what = holding(sieve, solids, classes, streams, sticks)
-            carried = carry(
-                streams,
-                step,
-                void=fluid_void(sieve, solids),
-                inside=solids.carried,
-                feed=classes.concentration * what.admitted,
-                holds=what.held,
-            )
-            after = settled(sieve, solids, classes, streams, (what, carried, step))
+            _, after = advanced(sieve, solids, classes, streams, what, step)
             self.solids = Deposits(
                 **{one.name: getattr(after, one.name)[..., :-1] for one in fields(Deposits)}
             )

@@ -18,7 +18,7 @@ from fdnet.classes.capture import (
     covered,
     wider_share,
 )
-from fdnet.classes.transport import Streams, Swept
+from fdnet.classes.transport import Streams, Swept, carry
 from fdnet.network.flow.flow import PLANE_TOLERANCE
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, frozen, one_line
@@ -312,18 +312,27 @@ def thickness_of_cake(sieve: Sieve, solids: Deposits) -> float:
     return float(solids.cake.sum()) / (1.0 - PACKED) / sieve.area
 
 
-def settled(
+def advanced(
     sieve: Sieve,
     solids: Deposits,
     classes: SizeClasses,
     streams: Streams,
-    step: tuple[Holding, Swept, float],
-) -> Deposits:
-    """The solids after a step: what was held goes to throats, pores and grains.
+    what: Holding,
+    filtrate: float,
+) -> tuple[Swept, Deposits]:
+    """What the flow carried while `filtrate` m3 of fluid entered, and the solids after it.
 
-    `step` holds what held back, what the flow carried, and the m3 of fluid that entered.
+    `what` says what holds back. What was held goes to throats, pores and grains.
     """
-    what, carried, filtrate = step
+    void = fluid_void(sieve, solids)
+    carried = carry(
+        streams,
+        filtrate,
+        void=void,
+        inside=solids.carried,
+        feed=classes.concentration * what.admitted,
+        holds=what.held,
+    )
     count = len(sieve.void)
     sticks = np.divide(what.stuck, what.held, out=np.zeros_like(what.held), where=what.held > 0)
     stuck = carried.held * sticks
@@ -339,8 +348,7 @@ def settled(
         in_pores[:, i] += np.bincount(streams.source, rest[:, i] - wedges, count)
         attached[:, i] += np.bincount(streams.source, stuck[:, i], count)
     come = filtrate * streams.fed[:, None] * classes.concentration
-    void = fluid_void(sieve, solids)
-    return replace(
+    after = replace(
         solids,
         carried=carried.concentration * void[:, None],
         in_pores=in_pores,
@@ -350,6 +358,7 @@ def settled(
         passed=solids.passed + carried.passed,
         supplied=solids.supplied + come.sum(axis=0),
     )
+    return carried, after
 
 
 LEAST_VOID = 1e-3

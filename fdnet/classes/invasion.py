@@ -16,19 +16,18 @@ from fdnet.classes.deposit import (
     PACKED,
     Deposits,
     Sieve,
+    advanced,
     bed_diameter,
-    fluid_void,
     holding,
     kept_shares,
     no_solids,
-    settled,
     thickness_of_cake,
 )
-from fdnet.classes.transport import Streams, carry, streams_of
+from fdnet.classes.transport import Streams, streams_of
 from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.network import Network
-from fdnet.scales.flow import carman_kozeny
+from fdnet.scales.flow import api_permeability, carman_kozeny
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
@@ -197,15 +196,7 @@ def invade_classes(
             bounds.append(0.25 * course.plug_time * rate)
         volume = min(wanted, *bounds)
         while True:
-            carried = carry(
-                state.streams,
-                volume,
-                void=fluid_void(sieve, solids),
-                inside=solids.carried,
-                feed=classes.concentration * what.admitted,
-                holds=what.held,
-            )
-            after = settled(sieve, solids, classes, state.streams, (what, carried, volume))
+            _, after = advanced(sieve, solids, classes, state.streams, what, volume)
             new = kept_shares(sieve, after, classes)
             change = _change(sieve, state.energy, kept, new)
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
@@ -277,32 +268,6 @@ def _row(
     }
 
 
-# ------------------------------------------------------------------------------------------------
-# The filter press of the API (RP 13I): 30 minutes at 100 psi through 45.8 cm2 of paper.
-#
-# The solids c of the mud make a cake of the porosity p and the thickness h = V c / (1 - p - c), V
-# being the filtrate per area. Darcy's law through it, V dV = k dp / mu (1 - p - c) / c dt, gives
-# V^2 = 2 k dp t (1 - p - c) / (mu c). The paper resists nothing, and there is no spurt.
-
-
-API_PRESSURE, API_TIME, API_AREA = 690e3, 1800.0, 45.8e-4
-"""Pa, s and m2."""
-
-
-def api_filtrate(permeability: float, *, viscosity: float, solids: float) -> float:
-    """Filtrate, m3, of the API's press by a cake of this `permeability` m2.
-
-    `viscosity` Pa s is that of the filtrate, `solids` the share of the mud by volume.
-    """
-    room = 2.0 * API_PRESSURE * API_TIME * (1.0 - PACKED - solids) / (viscosity * solids)
-    return API_AREA * float(np.sqrt(permeability * room))
-
-
-def api_permeability(filtrate: float, *, viscosity: float, solids: float) -> float:
-    """Permeability, m2, of the cake that lets `filtrate` m3 through the API's press."""
-    return (filtrate / api_filtrate(1.0, viscosity=viscosity, solids=solids)) ** 2
-
-
 def cake_permeability(case: InvasionCase) -> float | None:
     """Permeability, m2, of the cake that the case gives, or its API filtrate; None without."""
     if case.cake is None or case.cake.api_filtrate_m3 is None:
@@ -311,4 +276,5 @@ def cake_permeability(case: InvasionCase) -> float | None:
         case.cake.api_filtrate_m3,
         viscosity=case.fluid.viscosity_Pa_s,
         solids=case.fines.volume_fraction,
+        porosity=PACKED,
     )

@@ -27,7 +27,7 @@ from fdnet.report.tables import plain_json
 from fdnet.run.answer import DAMAGED_FROM, flow_lost, hawkins
 from fdnet.run.finished import FinishedRun
 from fdnet.run.folder import locked
-from fdnet.scales.flow import USUAL_WELL
+from fdnet.scales.flow import USUAL_WELL, api_permeability
 from fdnet.spheres.snapshot import Array
 from fdnet.statistics.bands import student_band
 
@@ -36,8 +36,6 @@ DEPTHS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2)
 """Depths, m, at which a well gives k / k0."""
 SHOTS, SHOT_LENGTH, SHOT_RADIUS = 13.0, 0.3, 0.005
 """Perforations: number a metre (4 a foot), length and radius, m."""
-API_AREA, API_PRESSURE, API_TIME = 45.8e-4, 6.895e5, 1800.0
-"""The API's filter press (API RP 13B-1): m2, Pa, s."""
 
 
 def core_flood(
@@ -329,18 +327,17 @@ def _banded(
 def _cake_of(
     handed: HandedUp, shape: str, permeability: float | None, api_filtrate: float | None
 ) -> CakeOf | None:
-    """The cake of the run, or that which is given; by Ruth's law k_c from an API filtrate V:
-
-    k_c = mu (V / A)^2 c0 / (2 dp t (1 - phi_c - c0)).
-    """
+    """The cake of the run, or that which is given, by its permeability or its API filtrate."""
     porosity = handed.cake.porosity if handed.cake else 0.5
     if permeability is None and api_filtrate is None:
         return handed.cake and replace(handed.cake, shape=shape)
     if permeability is None:
-        solids = sum(one.concentration for one in handed.mud)
-        slope = 2 * API_PRESSURE * API_TIME * (1 - porosity - solids)
-        way = (api_filtrate or 0.0) / API_AREA
-        permeability = handed.run.case.fluid.viscosity_Pa_s * way**2 * solids / slope
+        permeability = api_permeability(
+            api_filtrate or 0.0,
+            viscosity=handed.run.case.fluid.viscosity_Pa_s,
+            solids=sum(one.concentration for one in handed.mud),
+            porosity=porosity,
+        )
     return CakeOf(porosity=porosity, permeability=permeability, shape=shape)
 
 

@@ -20,7 +20,6 @@ from fdnet.classes.deposit import PACKED, Deposits, Sieve, sieve_of, thickness_o
 from fdnet.classes.invasion import (
     Course,
     PackStateOf,
-    api_filtrate,
     bed_of,
     cake_permeability,
     cake_resistance,
@@ -46,7 +45,7 @@ from fdnet.report.tables import write_rows
 from fdnet.run.fluid import FLOW_COLUMNS
 from fdnet.run.folder import RECORD_FORMAT, digests_of
 from fdnet.run.records import FinishedInvasion
-from fdnet.scales.flow import darcy_through, path_of
+from fdnet.scales.flow import api_filtrate, darcy_through, path_of
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen, resting
 
@@ -511,7 +510,7 @@ def class_summary(case: InvasionCase, model: ClassModel, kept: Kept) -> dict[str
     api = None
     if permeability is not None:
         viscosity, share = case.fluid.viscosity_Pa_s, case.fines.volume_fraction
-        api = 1e6 * api_filtrate(permeability, viscosity=viscosity, solids=share)
+        api = 1e6 * api_filtrate(permeability, viscosity=viscosity, solids=share, porosity=PACKED)
     classes = model.classes
     rows = [
         {

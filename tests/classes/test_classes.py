@@ -13,7 +13,7 @@ from fdnet.classes.capture import (
     mud_classes,
     wider_share,
 )
-from fdnet.classes.deposit import Sieve, fluid_void, holding, no_solids, settled, sieve_of
+from fdnet.classes.deposit import Sieve, advanced, holding, no_solids, sieve_of
 from fdnet.classes.invasion import Course, flows_through, invade_classes
 from fdnet.classes.transport import carry, streams_of
 from fdnet.network.flow.flow import solve_flow
@@ -69,23 +69,15 @@ def through(sieve):
     )
 
 
-def advanced(sieve, solids, classes, streams, filtering, filtrate):
+def step(sieve, solids, classes, streams, filtering, filtrate):
     what = holding(sieve, solids, classes, streams, filtering)
-    carried = carry(
-        streams,
-        filtrate,
-        void=fluid_void(sieve, solids),
-        inside=solids.carried,
-        feed=classes.concentration * what.admitted,
-        holds=what.held,
-    )
-    return carried, settled(sieve, solids, classes, streams, (what, carried, filtrate))
+    return advanced(sieve, solids, classes, streams, what, filtrate)
 
 
 def test_one_rate_in_a_chain_falls_exponentially():
     """c = c0 exp(-lambda x) (Iwasaki 1937) once the fluid of the chain is renewed."""
     sieve, classes = chain(40, void=1e-12), sizes(1e-6)
-    carried, _ = advanced(
+    carried, _ = step(
         sieve, no_solids(sieve, classes), classes, through(sieve), np.array([0.11]), 1.0
     )
     expected = classes.concentration * np.exp(-0.11 * sieve.place[:-1, 0])
@@ -101,7 +93,7 @@ def test_a_surface_that_fills_up_gives_the_solution_of_bohart_and_adams():
     most = 0.546 * 1.0 / (1.5 / 1e-6) * count  # solids that cover the surface of a unit of length
     for turn in range(1, 401):
         volume = 0.01 * most / (rate * classes.concentration[0])
-        carried, solids = advanced(sieve, solids, classes, streams, np.array([rate]), volume)
+        carried, solids = step(sieve, solids, classes, streams, np.array([rate]), volume)
         if turn % 100 == 0:
             x, t = rate * sieve.place[:-1, 0], 0.01 * turn
             expected = np.exp(t) / (np.exp(x) + np.exp(t) - 1.0)

@@ -13,8 +13,9 @@ from fdnet.errors import CaseError
 from fdnet.formation import handed_up
 from fdnet.formation.handed_up import fit_damage, fit_depths, hand_up
 from fdnet.formation.model import CakeOf, Column, Flood, march, steep_grid
-from fdnet.formation.scale_up import API_AREA, _merged, core_flood, well_invasion
+from fdnet.formation.scale_up import _merged, core_flood, well_invasion
 from fdnet.run.finished import FinishedRun
+from fdnet.scales.flow import API_AREA
 
 
 @pytest.fixture(autouse=True)
