@@ -9,7 +9,8 @@
     runs = fdnet.open_runs("runs/mine-8")         an ensemble: mean, band, by_depth()
 
 Spheres from files are `read_spheres`, step by step it is `build_network`, `measure_occupancy` and
-`solve_flow`, many runs are `ensemble`, `sweep` and `compare_runs`. Every error is an `FdnetError`.
+`solve_flow`, many runs are `ensemble`, `sweep` and `compare_runs`; `core_flood` and
+`well_invasion` carry a run to a core and a well. Every error is an `FdnetError`.
 `dir(fdnet)` lists what is public; the packages of fdnet are its inside and may change.
 Importing fdnet loads nothing heavy; a name is loaded when it is first used.
 """
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
     from fdnet.errors import LiggghtsError as LiggghtsError
     from fdnet.errors import MechanicsError as MechanicsError
     from fdnet.errors import NetworkError as NetworkError
+    from fdnet.formation.handed_up import hand_up as hand_up
+    from fdnet.formation.scale_up import core_flood as core_flood
+    from fdnet.formation.scale_up import well_invasion as well_invasion
     from fdnet.mechanics.of_case import elastic_moduli as elastic_moduli
     from fdnet.mechanics.of_case import triaxial_test as triaxial_test
     from fdnet.network.field.field import velocity_field as velocity_field
@@ -59,6 +63,8 @@ _HOMES = {
     "fdnet.run.pipeline": "run_case",
     "fdnet.run.finished": "open_run",
     "fdnet.campaign.api": "open_runs ensemble sweep compare_runs",
+    "fdnet.formation.handed_up": "hand_up",
+    "fdnet.formation.scale_up": "core_flood well_invasion",
     "fdnet.spheres.snapshot": "Snapshot",
     "fdnet.spheres.readers": "read_spheres",
     "fdnet.network.permeability": "permeability analyse compare",

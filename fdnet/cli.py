@@ -1,4 +1,4 @@
-"""The `fdnet` command: runs, ensembles and sweeps of cases, permeability, mechanics.
+"""The `fdnet` command: runs, ensembles and sweeps, permeability, mechanics, cores and wells.
 
 It reads the arguments, calls the package and prints. Exit codes: 0 done, 2 bad input (nothing
 written), 3 LIGGGHTS missing or failed, 4 degenerate geometry or an unconverged solve, 5 some
@@ -15,13 +15,14 @@ import threading
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
-from fdnet.commands import campaign, finished, init, mechanics, permeability, run
+from fdnet.commands import campaign, finished, formation, init, mechanics, permeability, run
 from fdnet.commands.options import Parser, meant
 from fdnet.errors import FdnetError, words_of
 
 COMMANDS = (
     *(init.add_init, run.add_case_commands, permeability.add_permeability),
     *(finished.add_commands_on_runs, mechanics.add_mechanics, campaign.add_campaign_commands),
+    formation.add_formation,
 )
 """What adds commands to the parser, in the order that `fdnet --help` shows."""
 FORMER = {
@@ -199,7 +200,10 @@ def completion(commands: Mapping[str, Parser], cases: Sequence[str]) -> str:
 
 
 _SCRIPT = """\
-[ -n "$ZSH_VERSION" ] && autoload -U +X bashcompinit && bashcompinit
+if [ -n "$ZSH_VERSION" ]; then
+  type compdef > /dev/null || {{ autoload -U compinit && compinit -i; }}
+  autoload -U +X bashcompinit && bashcompinit
+fi
 _fdnet() {{
   local word="${{COMP_WORDS[COMP_CWORD]}}" words=""
   case "${{COMP_WORDS[1]}} ${{COMP_WORDS[COMP_CWORD-1]}}" in

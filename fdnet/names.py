@@ -20,6 +20,8 @@ FLOW_LAW = "by section-archie with the standing fines"
 """The law of the permeability that a flow that follows its deposit meets."""
 SECTION_ARCHIE: DamageLawName = "section-archie"
 """The damage law that "auto" takes for more of them, and with other conductance laws."""
+SIZE_CLASSES = "size-classes"
+"""The law of the fast model (`invasion.method` = "network"): of the filled share of each pore."""
 MOST_SPHERES = 300_000
 """Grains and fines up to which "auto" takes `all-spheres`.
 

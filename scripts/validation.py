@@ -5,7 +5,8 @@
     .venv/bin/python scripts/validation.py list
 
 NAME runs a study, or goes on with it; `NAME --help` says what else it takes. Comparisons with
-commands of their own: accuracy, benchmark, truth, outside, mechanics, bridging, thesis.
+commands of their own: accuracy, benchmark, truth, outside, mechanics, scoreboard, bridging,
+closures, size-classes, both, thesis.
 """
 
 import sys
@@ -20,7 +21,11 @@ CHAPTERS: dict[str, str] = {
     "truth": "validation.truth_solved",
     "outside": "validation.outside",
     "mechanics": "validation.mechanics",
+    "scoreboard": "validation.scoreboard",
     "bridging": "validation.bridging",
+    "closures": "validation.closures",
+    "size-classes": "validation.size_classes",
+    "both": "validation.both",
     "thesis": "validation.thesis.command",
 }
 """Name and module of the comparisons with a command of their own, `main(arguments) -> int`.

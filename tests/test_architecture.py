@@ -18,10 +18,10 @@ LAYERS = [
     ["sizes", "statistics"],
     ["spheres", "case"],
     ["scales", "network"],
-    ["mechanics"],
+    ["mechanics", "classes"],
     ["dem", "report"],
     ["run"],
-    ["campaign"],
+    ["campaign", "formation"],
     ["commands"],
     ["cli"],
     ["__main__"],
@@ -41,10 +41,16 @@ NETWORK_LAYERS = [
     ["permeability"],
     ["warm_up"],
 ]
+FORMATION_LAYERS = [["model"], ["handed_up"], ["scale_up"]]
 CAMPAIGN_LAYERS = [["plan"], ["engine", "result"], ["page"], ["api"]]
-ROOMS = {"fdnet": LAYERS, "fdnet.campaign": CAMPAIGN_LAYERS, "fdnet.network": NETWORK_LAYERS}
+ROOMS = {
+    "fdnet": LAYERS,
+    "fdnet.campaign": CAMPAIGN_LAYERS,
+    "fdnet.formation": FORMATION_LAYERS,
+    "fdnet.network": NETWORK_LAYERS,
+}
 DOORS = {
-    "jinja2": {"dem/deck", "report/html", "campaign/page"},
+    "jinja2": {"dem/deck", "report/html"},
     "subprocess": {
         "campaign/engine",
         "dem/liggghts",
@@ -63,7 +69,7 @@ DOORS = {
     "vtkmodules": {"report/vtk", "spheres/vtk_file"},
     "imageio_ffmpeg": {"report/picture"},
     "openpnm": {"report/tables"},
-    "matplotlib": {"campaign/page", "report/figures"},
+    "matplotlib": {"report/figures"},
     "PIL": {"report/html", "report/picture"},
     "numba": {"network/compiled"},
     "pymetis": {"network/flow/solver"},

@@ -134,6 +134,15 @@ def test_check_refuses_what_run_refuses(tmp_path, capsys):
                 assert not out.exists()
 
 
+def test_a_specimen_that_the_damage_can_cross_is_named(root):
+    """Sauter's mean of the grains of the quick case is 0.498 mm: 1.49 mm are 3 of them."""
+    for side, named in (("1.4 mm", True), ("1.6 mm", False)):
+        given = [f"box.size=['{side}', '2.5 mm', '2.5 mm']", "analysis.sections=1"]
+        case = fdnet.read_case(root / "cases" / "quick.toml", assignments=given)
+        said = [one.what for one in checked(case, scales_of(case)).findings]
+        assert any("mean grains long" in one for one in said) == named, side
+
+
 def test_what_check_finds_stands_in_summary_and_report(finished):
     """The tiny run is 3.2 grains wide: the study of widths has some 30 % for it."""
     case = fdnet.read_case(finished.path / "case.toml")

@@ -1,6 +1,7 @@
 """The command line as a whole: its help, what it suggests, and what completes it."""
 
 import re
+import shutil
 import subprocess
 import sys
 
@@ -10,7 +11,7 @@ from fdnet.cli import FORMER, _parser, commands_of, main
 
 LISTED = (
     *("init", "run", "check", "permeability", "stokes"),
-    *("movie", "mechanics", "ensemble", "sweep", "compare"),
+    *("movie", "mechanics", "ensemble", "sweep", "compare", "core", "well"),
 )
 
 
@@ -20,7 +21,7 @@ def ended(arguments: list[str]) -> int:
     return int(end.value.code or 0)
 
 
-def test_fdnet_alone_lists_ten_commands(capsys):
+def test_fdnet_alone_lists_twelve_commands(capsys):
     assert main([]) == 0
     alone = capsys.readouterr().out
     assert ended(["--help"]) == 0
@@ -73,6 +74,10 @@ def test_a_shell_completes_commands_options_and_choices():
         command = ["bash", "-c", f"{script}\n{ask}", "bash", *words]
         said = subprocess.run(command, capture_output=True, text=True, check=True)
         assert (said.stdout.strip(), said.stderr) == (offered, ""), words
+    if shutil.which("zsh"):  # without a start-up file, which would load what completes
+        command = ["zsh", "-fc", f"{script}\nprint -r -- $_comps[fdnet]"]
+        said = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert (said.stdout.strip(), said.stderr) == ("_bash_complete -o default -F _fdnet", "")
 
 
 def test_a_dry_run_prints_the_scales_and_writes_nothing(tmp_path, root, capsys, monkeypatch):

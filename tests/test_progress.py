@@ -61,6 +61,16 @@ def test_the_time_left_of_recorded_runs_is_within_a_factor_of_two(clock):
                     assert 0.5 < progress.left() / left < 2
 
 
+def test_steps_that_become_shorter_end_later():
+    """A chunk of 100 steps, then one of 200: the 8 that are left take 200 each."""
+    progress = Progress("invade", Forecast(expected=1000, chunk=100), show=False)
+    for line in ("FDNET checkpoint 1 100 0 9 0", "FDNET checkpoint 2 300 0 9 0"):
+        progress(line)
+    assert (progress.even, progress.end) == (200, 300 + 8 * 200)
+    progress("      400     1369   1.5e-07     0.21")
+    assert (progress.even, progress.end) == (250, 300 + 8 * 200)
+
+
 def test_progress_never_runs_over_its_end():
     """Far beyond the expected step there is always more to come, up to the cap."""
     forecast = Forecast(expected=1000, plug=300, cap=5000)

@@ -239,6 +239,7 @@ def carry_out(
 
 def _refuse_hopeless(path: Path, plan: Plan, how: HowToRun) -> None:
     """Raise what stops every variant, before anything is written."""
+    how.refuse()
     errors: list[FdnetError] = []
     options: dict[str, Any] = {k: getattr(how, k) for k in ("liggghts", "launcher", "timeout")}
     options |= {"ranks": plan.ranks, "stages": plan.stages}

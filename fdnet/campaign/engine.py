@@ -64,6 +64,13 @@ class HowToRun:
         given = {"--liggghts": path, "--launcher": self.launcher, "--timeout": timeout}
         return [word for name, value in given.items() if value for word in (name, value)]
 
+    def refuse(self) -> None:
+        """Raise CaseError where Snakemake is asked for and not installed."""
+        plugin = "snakemake_executor_plugin_slurm" if self.engine == "slurm" else "snakemake"
+        if self.engine != "local" and not (has_snakemake() and find_spec(plugin)):
+            advice = "pip install 'fdnet[sweep]', or take --engine local"
+            raise CaseError(f"--engine {self.engine}: {plugin} is not installed; {advice}")
+
     def say(self, text: str) -> None:
         """Show how far it is."""
         if not self.quiet:
@@ -86,15 +93,11 @@ Ended = Callable[[str, int], None]
 def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
     """Carry out what is missing of the plan; `lock` is the descriptor of the folder's lock.
 
-    A run that fails stops no other. Raises CaseError for a full disk and for a missing Snakemake.
+    A run that fails stops no other. Raises CaseError for a full disk.
     """
     tasks = _tasks_of(path, plan, how)
     if not tasks:
         return
-    plugin = "snakemake_executor_plugin_slurm" if how.engine == "slurm" else "snakemake"
-    if how.engine != "local" and not (has_snakemake() and find_spec(plugin)):
-        advice = "pip install 'fdnet[sweep]', or take --engine local"
-        raise CaseError(f"--engine {how.engine}: {plugin} is not installed; {advice}")
     missing = sum(task.makes.endswith(MANIFEST) for task in tasks)
     how.say(f"{len(plan.jobs)} runs, {missing} of them to do")
     for task in tasks:

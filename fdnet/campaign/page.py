@@ -1,33 +1,33 @@
 """What a reader sees of a comparison: sentences, figures, and compare.html with both."""
 
-import base64
-import io
 import math
 import os
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
-from importlib import metadata, resources
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import quote
 
-import numpy as np
-
 from fdnet.campaign import result as results
 from fdnet.campaign.result import Comparison
 from fdnet.files import write_text
-from fdnet.report import figures
-from fdnet.report.tables import MILLIDARCY
+from fdnet.report import figures, html
+from fdnet.report.tables import MILLIDARCY, in_millidarcy, millimetres, percent
 from fdnet.statistics.bands import Band, seeds_for_width
 from fdnet.statistics.differences import MOST_SEEDS
 
 if TYPE_CHECKING:
     import pandas as pd
 
-SHOWN = ("k_reduction", "k_damaged_m2", "invasion_depth_p95_m", "invaded_count", "passed_count")
+SHOWN = ["k_reduction", "damage.face_lost", "k_damaged_m2", "invasion_depth_p95_m"]
+SHOWN += ["skin", "skin_flow_lost", "invaded_count", "passed_count"]
 """Quantities of the tables of the page, after the ranked one."""
+LAYERS = ["porosity_initial", "porosity_damaged", "k_initial_m2", "k_damaged_m2", "k_reduction"]
+LAYERS += ["fines_count"]
+"""Quantities of the tables by depth."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -78,12 +78,15 @@ class Compared:
 
     def plot(self) -> Any:
         """Permeability in place (mD) against depth (mm), mean and band; returns the axes."""
-        (axes,) = figures.shown(lambda figure: _fill_depth(figure.subplots(), self.comparison))
-        return axes
+        return figures.shown(partial(_fill_depth, comparison=self.comparison))[0]
 
     def __str__(self) -> str:
-        """The ranking and the differences."""
-        return "\n".join([*self.ranking, *self.differences])
+        """The ranking and the differences; of one variant the other quantities of the page."""
+        variants, more = self.comparison.variants, list[str]()
+        for quantity in _shown(self.comparison)[1:] if len(variants) == 1 else ():
+            band = self.comparison.band(variants[0], quantity)
+            more.append(f"{label(quantity)}: {band_text(quantity, band)}")
+        return "\n".join([*self.ranking, *more, *self.differences])
 
     __repr__ = __str__
 
@@ -91,41 +94,43 @@ class Compared:
 def write_comparison(
     comparison: Comparison, limits: Mapping[str, float] | None = None
 ) -> Compared:
-    """Write table.csv, summary.json and compare.html; `limits` (SI) are those of targets."""
-    from jinja2 import Environment, StrictUndefined
-
+    """Write table.csv, summary.json, figures and compare.html; `limits` (SI) are of targets."""
     results.write_table(comparison)
-    muds, ranking = candidates(comparison, limits or {}), ranking_lines(comparison)
-    pairs, judged = pair_lines(comparison), [mud.line for mud in muds]
-    design = [{"name": mud.name, "state": mud.state} for mud in muds]
-    more = {"design": design, "targets": limits} if limits else {}
+    muds, made = candidates(comparison, limits or {}), compared(comparison)
+    states = [{"name": mud.name, "state": mud.state} for mud in muds]
+    more = {"candidates": states, "targets": limits} if limits else {}
     summary = results.write_summary(comparison, more)
-    trim: dict[str, Any] = {"trim_blocks": True, "lstrip_blocks": True}
-    environment = Environment(autoescape=True, undefined=StrictUndefined, **trim)
-    shown = dict.fromkeys([comparison.ranked_by, *SHOWN])
-
-    def link(run: results.Entry) -> str:
-        report = run.folder / "report.html"
-        target = report if report.exists() else run.folder
-        return quote(os.path.relpath(target, comparison.path))
-
-    page = resources.files("fdnet.campaign").joinpath("compare.html.j2").read_text("utf-8")
-    text = environment.from_string(page).render(
+    judged = [mud.line for mud in muds]
+    text = html.page_text(
+        "campaign/compare.html.j2",
         comparison=comparison,
-        columns=[one for one in shown if one in comparison.numbers],
-        muds=judged,
-        ranking=[re.sub(r"^\d+\. ", "", line) for line in ranking],
-        pairs=pairs,
-        figures=[*filter(None, (_draw_ranking(comparison), _draw_depth(comparison)))],
-        label=lambda quantity: LABELS.get(quantity, quantity),
+        answer=judged[0].removeprefix("1. ") if judged else answer_words(comparison),
+        by="the targets" if judged else f"{label(comparison.ranked_by)}, smallest first",
+        ranking=[re.sub(r"^\d+\. ", "", line) for line in judged or made.ranking],
+        pairs=made.differences,
+        figures=_draw(comparison),
+        columns=_shown(comparison),
+        slabs=sorted({int(one[1]) for one in map(results.SLAB.match, comparison.numbers) if one}),
+        layers=[one for one in html.SECTION_COLUMNS[3:] if one[0] in LAYERS],
+        label=label,
         value_text=value_text,
-        band_text=band_text,
-        link=link,
+        ends_text=ends_text,
+        link=partial(_link, comparison.path),
         version=metadata.version("fdnet"),
     )
     write_text(comparison.path / results.PAGE, text)
-    order, gaps = (*judged, *ranking), tuple(pairs)
-    return Compared(comparison=comparison, summary=summary, ranking=order, differences=gaps)
+    return replace(made, summary=summary, ranking=(*judged, *made.ranking))
+
+
+def _shown(comparison: Comparison) -> list[str]:
+    """The ranked quantity, and those of `SHOWN` that are known."""
+    every = dict.fromkeys([comparison.ranked_by, *SHOWN])
+    return [one for one in every if one in comparison.numbers]
+
+
+def _link(page: Path, run: results.Entry) -> str:
+    report = run.folder / "report.html"
+    return quote(os.path.relpath(report if report.exists() else run.folder, page))
 
 
 def compared(comparison: Comparison) -> Compared:
@@ -141,8 +146,11 @@ def compared(comparison: Comparison) -> Compared:
 # ---- Sentences.
 LABELS = {
     "k_reduction": "permeability lost",
+    "skin": "skin of the well",
+    "damage.face_lost": "permeability lost by the layer at the face",
     "k_damaged_m2": "damaged permeability",
     "invasion_depth_p95_m": "depth above which 95 % of the fines lie",
+    "skin_flow_lost": "flow of the well lost to the skin",
     "invaded_count": "fines that invaded",
     "passed_count": "fines that passed",
     "passed_fraction": "share of the fines that pass through the specimen unbridged",
@@ -152,37 +160,58 @@ LABELS = {
 """Quantities of a summary in words."""
 
 
-def unit_of(quantity: str) -> tuple[float, str]:
-    """Factor from SI to the unit that a reader sees, and this unit; "" for a plain number."""
-    if results.SHARES.search(quantity):
-        return 100.0, "%"
-    if quantity.endswith("_m2"):
-        return 1 / MILLIDARCY, "mD"
-    return (1e3, "mm") if quantity.endswith("_m") else (1.0, "")
+_K = re.compile(r"(?<!_m3)_m2$")
+
+
+def label(quantity: str) -> str:
+    """A quantity in words; its key where it has none."""
+    return LABELS.get(quantity, quantity)
 
 
 def value_text(quantity: str, value: float | None) -> str:
-    """A value for a reader, with its unit."""
-    factor, unit = unit_of(quantity)
+    """A value for a reader, with its unit, as the report of a run has it."""
     if value is None or math.isnan(value):
-        return "no value"
-    return f"{_digits(factor * value)} {unit}".strip()
+        return html.DASH
+    if results.SHARES.search(quantity):
+        text = f"{percent(value)} %"
+    elif _K.search(quantity):
+        text = f"{in_millidarcy(value)} mD"
+    else:
+        text = millimetres(value) if quantity.endswith("_m") else html.quantity(value)
+    return re.sub("^-", "\u2212", text)
 
 
-def _digits(value: float) -> str:
-    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:z.3g}"
-    return text.replace("-", "\u2212")
+def ends_text(quantity: str, band: Band) -> str:
+    """A band without its mean: `95 % band 0.0 to 92.0 %, cut at 0.0 %`; "" without a value."""
+    if math.isnan(band.low):
+        return "" if math.isnan(band.mean) else "no band: one run"
+    low, high, *cut = (value_text(quantity, one) for one in (band.low, band.high, *band.cut))
+    ends = f"95 % band {low.partition(' ')[0]} to {high}"
+    return f"{ends}, cut at {' and '.join(cut)}" if cut else ends
 
 
 def band_text(quantity: str, band: Band) -> str:
-    """A mean with its band: `45 % (95 % band 0 to 92 %, cut at 0 %)`."""
-    mean = value_text(quantity, band.mean)
-    if math.isnan(band.low):
-        return mean if math.isnan(band.mean) else f"{mean} (no band: one run)"
-    low = _digits(unit_of(quantity)[0] * band.low)
-    cut = " and ".join(value_text(quantity, bound) for bound in band.cut)
-    high = value_text(quantity, band.high) + (f", cut at {cut}" if cut else "")
-    return f"{mean} (95 % band {low} to {high})"
+    """A mean with its band: `45.0 % (95 % band 0.0 to 92.0 %, cut at 0.0 %)`."""
+    ends = ends_text(quantity, band)
+    return f"{value_text(quantity, band.mean)} ({ends})" if ends else html.DASH
+
+
+def answer_words(comparison: Comparison) -> str:
+    """What the seeds say together: the mean of one variant, or the best and who is as good."""
+    first, *others = ranking_lines(comparison)
+    if not others:
+        return first
+    best = comparison.ranking()[0]
+    pairs = [pair for pair in comparison.pairs() if pair.one == best]
+    alike = [pair.other for pair in pairs if not pair.apart]
+    said = f"{first.removeprefix('1. ')} "
+    if not alike:
+        return said + "It is the smallest, and differs from every other variant." * bool(pairs)
+    more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
+    return (
+        f"{said}It is the smallest mean, but these seeds do not tell it apart from "
+        f"{', '.join(alike[:3])}{more}."
+    )
 
 
 def ranking_lines(comparison: Comparison) -> list[str]:
@@ -193,7 +222,7 @@ def ranking_lines(comparison: Comparison) -> list[str]:
         place = f"{number}. {name}" if len(names) > 1 else name
         count = len(comparison.values(name, quantity))
         band = band_text(quantity, comparison.band(name, quantity))
-        told = f"{LABELS.get(quantity, quantity)} {band}, {count} seed{'s' if count > 1 else ''}"
+        told = f"{label(quantity)} {band}, {count} seed{'s' if count > 1 else ''}"
         lines.append(f"{place}: {told if count else 'no finished run'}.")
     return lines
 
@@ -241,7 +270,7 @@ def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[Cand
             state = 0 if band.high <= limit else 2 if band.low > limit else 1
             worst = max(worst, state)
             over = max(over, band.mean / limit if limit else math.inf)
-            reason = f"{LABELS.get(quantity, quantity)} {band_text(quantity, band)}, at most "
+            reason = f"{label(quantity)} {band_text(quantity, band)}, at most "
             reason += f"{value_text(quantity, limit)}: {states[state]}"
             if state == 1 and len(values) > 1 and (gap := abs(band.mean - limit)) > 0:
                 needed = seeds_for_width(values, gap, MOST_SEEDS)
@@ -259,92 +288,81 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5
 """The palette of Okabe and Ito (2008), which readers with any colour vision can tell apart."""
 
 
-def _draw_ranking(comparison: Comparison) -> dict[str, str] | None:
+def _draw(comparison: Comparison) -> dict[str, dict[str, str]]:
+    """The figures that have data, drawn into the folder of the page, by the stem of their file."""
+    shown, several = dict[str, dict[str, str]](), len(comparison.variants) > 1
+
+    def add(name: str, fill: Callable[..., None], caption: str) -> None:
+        path = figures.draw(comparison.path / f"{name}.svg", partial(fill, comparison=comparison))
+        shown[name] = html.shown_figure(path, caption)
+
+    if several and comparison.numbers.get(comparison.ranked_by):
+        caption = "Every run (grey), mean over the seeds (line) and its 95 % band (blue)."
+        add("ranking", _fill_ranking, caption)
+    if "sections.1.k_damaged_inplace_m2" in comparison.numbers:
+        more = f", of {len(COLOURS)} variants at most" if several else "; thin lines are the runs"
+        caption = (
+            "Permeability in place of the slabs after the invasion, mean over the seeds with its "
+            f"95 % band; dashed is the intact sand{more}."
+        )
+        add("by_depth", _fill_depth, caption)
+    return shown
+
+
+def _fill_ranking(figure: Any, *, comparison: Comparison) -> None:
     """Every run as a dot, the mean of each variant with its band."""
-    quantity = comparison.ranked_by
+    quantity, axes = comparison.ranked_by, figure.subplots()
     names = [name for name in comparison.ranking() if comparison.values(name, quantity)]
-    if not names:
-        return None
-    factor, _ = unit_of(quantity)
-    figure, axes = _axes(0.9 + 0.42 * len(names))
+    factor, unit = _unit_of(quantity)
     for place, name in enumerate(names):
-        values = factor * np.array(list(comparison.values(name, quantity).values()))
         band = comparison.band(name, quantity)
-        axes.plot(values, np.full(len(values), place), "o", ms=4, color="0.6", zorder=2)
-        ends = (factor * band.low, factor * band.high)
-        axes.hlines(place, *ends, color=COLOURS[0], lw=5, alpha=0.4)
-        axes.plot(factor * band.mean, place, "|", ms=16, mew=2.5, color=COLOURS[0], zorder=3)
+        values = [factor * value for value in comparison.values(name, quantity).values()]
+        axes.plot(values, [place] * len(values), "o", ms=4, color="0.6", zorder=2)
+        axes.hlines(place, factor * band.low, factor * band.high, figures.BLUE, lw=5, alpha=0.4)
+        axes.plot(factor * band.mean, place, "|", ms=16, mew=2.5, color=figures.BLUE, zorder=3)
     axes.set_yticks(range(len(names)), [_short(name) for name in names])
     axes.invert_yaxis()
     axes.margins(y=0.25 / len(names) + 0.05)
-    axes.set_xlabel(_with_unit(quantity))
-    caption = "Every run (grey), mean over the seeds (line) and its 95 % band (blue)"
-    return _svg(figure, f"{caption}{', best first' if len(names) > 1 else ''}.")
+    axes.set_xlabel(f"{label(quantity)} ({unit})")
+    figure.set_size_inches(7.2, 0.9 + 0.42 * len(names))
 
 
-def _draw_depth(comparison: Comparison) -> dict[str, str] | None:
+def _fill_depth(figure: Any, *, comparison: Comparison) -> None:
     """Permeability in place of the slabs by depth, of the first variants of the ranking."""
-    figure, axes = _axes(4.2)
-    drawn = _fill_depth(axes, comparison)
-    if not drawn:
-        return None
-    caption = (
-        "Permeability of the slabs by depth after the invasion, mean over the seeds with its 95 % "
-        f"band, of the first {drawn} variants; dashed is the intact sand."
-    )
-    return _svg(figure, caption)
-
-
-def _fill_depth(axes: Any, comparison: Comparison) -> int:
-    """Draws permeability by depth with its bands; gives the number of variants drawn."""
-    slabs = [key[:-6] for key in comparison.numbers if re.match(r"sections\.\d+\.x_lo_m", key)]
-    drawn = 0
+    axes, table = figure.subplots(), results.depth_table(comparison)
+    runs = comparison.done if len(comparison.variants) == 1 else []
     for colour, name in zip(COLOURS, comparison.ranking(), strict=False):
-        mine = [slab for slab in slabs if comparison.values(name, f"{slab}x_lo_m")]
-        if not mine:
+        mine = table[table["variant"] == name]
+        if not len(mine):
             continue
-        starts, stops, intact, damaged = (
-            [comparison.band(name, slab + end) for slab in mine]
-            for end in ("x_lo_m", "x_hi_m", "k_initial_inplace_m2", "k_damaged_inplace_m2")
-        )
-        edges = [1e3 * band.mean for band in (*starts, stops[-1])]
-        look: dict[str, Any] = {"edges": edges, "baseline": None, "color": colour}
-        after, before = ([one.mean / MILLIDARCY for one in bands] for bands in (damaged, intact))
-        axes.stairs(after, lw=2, label=_short(name), **look)
-        axes.stairs(before, lw=1, ls="--", **look)
-        low, high = ([getattr(b, end) / MILLIDARCY for b in damaged] for end in ("low", "high"))
-        axes.stairs(high, **look | {"baseline": low}, fill=True, alpha=0.18)
-        drawn += 1
-    axes.set(xlabel="depth (mm)", ylabel="permeability in place (mD)", ylim=(0, None))
-    if drawn:
-        axes.legend(fontsize=8, framealpha=0.9)
-    return drawn
+        edges, look = [*mine["x_lo_m"], mine["x_hi_m"].iloc[-1]], {"color": colour}
+        mean, low, high, intact = (
+            mine[f"k_{end}"].to_numpy() / MILLIDARCY
+            for end in ("damaged_inplace_m2", "damaged_inplace_m2_low",
+                        "damaged_inplace_m2_high", "initial_inplace_m2")
+        )  # fmt: skip
+        figures.stairs(axes, edges, high, baseline=low, fill=True, alpha=0.18, **look)
+        figures.stairs(axes, edges, intact, linestyle="--", linewidth=1.0, **look)
+        figures.stairs(axes, edges, mean, label="mean" if runs else _short(name), **look)
+        axes.set_xlim(1e3 * edges[0], 1e3 * edges[-1])
+        for run in runs:
+            keys = [f"sections.{slab}.k_damaged_inplace_m2" for slab in mine["section"]]
+            one = [run.numbers.get(key) or math.nan for key in keys]
+            figures.stairs(axes, edges, [k / MILLIDARCY for k in one], linewidth=0.6, **look)
+    axes.set(xlabel=figures.DEPTH_LABEL, ylabel="permeability in place (mD)", ylim=(0, None))
+    axes.yaxis.set_major_formatter("{x:,.10g}")
+    figures.legend_above(axes, columns=2)
 
 
-def _axes(height: float) -> tuple[Any, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.2, height), layout="constrained")
-    axes = figure.subplots()
-    axes.grid(lw=0.4, color="0.85")
-    return figure, axes
-
-
-def _svg(figure: Any, caption: str) -> dict[str, str]:
-    from matplotlib import rc_context
-
-    text = io.StringIO()
-    with rc_context({"svg.hashsalt": "fdnet"}):
-        figure.savefig(text, format="svg", metadata={"Date": None})
-    data = base64.b64encode(text.getvalue().encode()).decode("ascii")
-    return {"uri": f"data:image/svg+xml;base64,{data}", "caption": caption}
+def _unit_of(quantity: str) -> tuple[float, str]:
+    """Factor from SI to the unit that a figure has, and this unit."""
+    if results.SHARES.search(quantity):
+        return 100.0, "%"
+    if _K.search(quantity):
+        return 1 / MILLIDARCY, "mD"
+    return (1e3, "mm") if quantity.endswith("_m") else (1.0, "–")
 
 
 def _short(name: str) -> str:
     """A name as it is drawn: not too long, and no sign of it read as a formula."""
     return (name if len(name) <= 40 else f"{name[:37]}...").replace("$", r"\$")
-
-
-def _with_unit(quantity: str) -> str:
-    unit = unit_of(quantity)[1]
-    return f"{LABELS.get(quantity, quantity)} ({unit})" if unit else LABELS.get(quantity, quantity)

@@ -24,6 +24,9 @@ from fdnet.files import expanded, refuse_folder_name, write_text
 from fdnet.names import STAGES
 from fdnet.report.tables import JsonObject, read_json, read_summary
 from fdnet.run.folder import MANIFEST, check_finished
+from fdnet.scales.clock import spoken_time
+from fdnet.scales.cost import cost_of
+from fdnet.scales.scales import scales_of
 
 MOST_JOBS = 1000
 """Most runs of a plan that are accepted without a word of confirmation."""
@@ -185,6 +188,22 @@ class _SweepFile(pydantic.BaseModel):
                 raise ValueError(f"variants.name: {name!r}, expected one line of text")
             rows.append((name, own))
         return rows
+
+
+def plan_lines(plan: Plan) -> Iterator[str]:
+    """What runs take and leave out, from the cases alone: a line for each variant, one for all."""
+    whole = 0.0
+    for one in plan.variants:
+        scales = scales_of(one.case)
+        seconds = cost_of(one.case, scales).seconds
+        whole += seconds * len(plan.seeds)
+        gone = [text for text in scales.warnings if text.kind == "sizes-left-out"]
+        yield "; ".join([f"{one.name}: {spoken_time(seconds)} a run", *gone])
+    several = len(set(plan.packs.values()))
+    yield (
+        f"{len(plan.jobs)} runs: {spoken_time(whole)} on one idle core, within a factor of 2; "
+        f"{several or 'no'} packs of grains serve several runs"
+    )
 
 
 def label_of(keys: Mapping[str, Any]) -> str:

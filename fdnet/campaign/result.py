@@ -30,7 +30,7 @@ RANKED_BY = "k_reduction"
 PASSED = "passed_fraction"
 TABLE, SUMMARY, PAGE = "table.csv", "summary.json", "compare.html"
 SHARES = re.compile(
-    r"(^|\.)(k_reduction|.*porosity.*|.*_fraction|share_\w+|.*_share|\w+_loss|\w*over_initial)$"
+    r"(^|\.)(k_reduction|.*porosity.*|.*_fraction|share_\w+|.*_share|\w+_lost|\w*over_initial)$"
 )
 """Quantities that are shares of one: a reader sees them in percent."""
 SLAB = re.compile(r"sections\.(\d+)\.(?!section$)(\w+)")

@@ -35,6 +35,8 @@ from fdnet.case.tables import (
     Drag,
     Fluid,
     Gravity,
+    InvasionChoices,
+    MudCake,
     Part,
     Run,
     Well,
@@ -55,6 +57,8 @@ KEYS = (
     "drag",
     "gravity",
     "contact",
+    "invasion",
+    "cake",
     "clean_up",
     "bonds",
     "run",
@@ -215,7 +219,25 @@ class InvasionCase(Case):
     """
 
     fines: Fines
+    invasion: InvasionChoices | None = None
+    cake: MudCake | None = None
     clean_up: CleanUp | None = None
+
+    @property
+    def by_classes(self) -> bool:
+        """Whether the pore network carries the mud, as size classes."""
+        return self.invasion is not None and self.invasion.method == "network"
+
+    @property
+    def with_classes(self) -> bool:
+        """Whether it carries what is finer than the cut, beside the spheres."""
+        return self.invasion is not None and self.invasion.method == "both"
+
+    @property
+    def solids_fraction(self) -> float:
+        """Volume of the solids that invade, as spheres and classes, over that of the mud."""
+        fines = self.fines
+        return fines.volume_fraction if self.with_classes else fines.placed_fraction
 
     @property
     def spheres(self) -> dict[str, Spheres]:
@@ -344,6 +366,7 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
     box, grains, fines, bonds = at("box"), at("grains"), at("fines"), at("bonds")
     fluid, well, drag, contact = at("fluid"), at("well"), at("drag"), at("contact")
     run, clean_up, analysis = at("run"), at("clean_up"), at("analysis")
+    invasion, cake = at("invasion"), at("cake")
     unsized = set(bad)
     if grains is None or not grains.has_one_curve:
         unsized.add("grains.radius_mm")
@@ -447,7 +470,12 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
             imaged = box.sides == "periodic" and axis != "x"
             least = diameter * (2.0 if imaged else 1.0)
             if side < least:
-                why = "a grain would meet its own image" if imaged else "a grain does not fit"
+                why = (
+                    "the largest grain would meet its own image"
+                    if imaged
+                    else "a grain does not fit"
+                )
+                why += "; grains.sizes.cut_percent leaves the largest out" * grains.measured
                 yield (
                     f"box.size_mm: side {axis} is {side:g} mm, expected at least {least:g} mm "
                     f"({why})"
@@ -477,9 +505,9 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
         and not list(_some_throat(grains, fines))
     ):
         yield (
-            f"{size_text('fines', fines)} is not below {size_text('grains', grains)} "
-            "(the network needs a clear gap)"
-            + ("; narrow sizes.cut_percent of one" if fines.measured or grains.measured else "")
+            f"{size_text('fines', fines)}, expected below {size_text('grains', grains)}: "
+            "solids as large as the grains only lie in the cake"
+            + ("; leave them out by fines.sizes.cut_percent" if fines.measured else "")
         )
     if good("grains.radius_mm", "fines.radius_mm"):
         yield from _some_throat(grains, fines)
@@ -548,6 +576,37 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
                     f"{clean_up.duration_ms:g}: give one of the two"
                 )
 
+    # the mud as size classes on the network
+
+    by_classes = given("invasion.method") and invasion.method != "liggghts"
+    if given("cake.permeability_m2", "cake.api_filtrate_mL"):
+        given_twice = cake.permeability_m2 is not None and cake.api_filtrate_mL is not None
+        if given_twice:
+            yield (
+                f"cake.permeability_m2: {cake.permeability_m2:g} with cake.api_filtrate_mL "
+                f"{cake.api_filtrate_mL:g}: each gives the cake, keep one of them"
+            )
+        if not by_classes:
+            yield (
+                "cake: the table belongs to invasion.method = 'network' or 'both'; with spheres "
+                "alone the cake is that of the fines that LIGGGHTS moves; leave it out"
+            )
+    if by_classes and given("clean_up.drawdown_MPa"):
+        yield (
+            f"clean_up: with invasion.method = {invasion.method!r} nothing turns the flow back; "
+            "leave the table out, or take 'liggghts'"
+        )
+    if by_classes and good("grains.motion") and grains.motion == "mobile":
+        yield (
+            f"grains.motion: 'mobile' with invasion.method = {invasion.method!r}, whose pores are "
+            "those of grains that stay; take 'fixed'"
+        )
+    if by_classes and good("drag.field") and invasion.method == "both" and not drag.coupled:
+        yield (
+            f"drag.field: {drag.field!r} with invasion.method = 'both', whose spheres and classes "
+            "share one flow; leave it out, or take 'network'"
+        )
+
     # the forces of the fluid
 
     # The network has one way for each of these; it alone knows the drive and the updates.
@@ -566,11 +625,7 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
                 f"drag.{key}: {getattr(drag, key)!r} belongs to drag.field 'network'; the uniform "
                 "field always has its first velocity; leave it out"
             )
-    if (
-        good("drag.field", "grains.motion")
-        and drag.field == "network"
-        and grains.motion == "mobile"
-    ):
+    if good("drag.field", "grains.motion") and drag.coupled and grains.motion == "mobile":
         yield (
             "grains.motion: 'mobile' with drag.field 'network', whose pores are those of grains "
             "that stay; take 'fixed', or set drag.field = 'uniform'"

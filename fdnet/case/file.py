@@ -617,6 +617,8 @@ def read_case(
     """
     try:
         data = put_keys(set_keys(toml_tables(path), assignments or []), values or {})
+        if {"case", "cases"} & data.keys():
+            raise CaseError(f"{path}: is a sweep file and no case; fdnet sweep takes it")
         return case_from(data, source=str(path), folder=expanded(path).parent)
     except RecursionError as error:
         raise CaseError(f"{path}: its tables or lists are nested too deeply for a case") from error

@@ -411,8 +411,9 @@ class Fines(Spheres):
     materials: Materials | None = None
     """Several materials instead; their keys are below."""
     cut_um: Positive | None = None
-    """Diameter below which solids of measured sizes are left out. The mud is thinner by their
-    share, which a warning names."""
+    """Diameter below which solids of measured sizes are no spheres. They are size classes with
+    invasion.method = "both", else they are left out: the mud is thinner by their share, which a
+    warning names."""
     concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = 0.10
     """Volume of solids over that of the mud."""
     solids_kg_m3: Positive | None = None

@@ -324,7 +324,7 @@ class Drag(Part):
     @property
     def slowed(self) -> bool:
         """Whether the deposit slows the mud down."""
-        return self.field == "network" and self.drive != "rate"
+        return self.coupled and self.drive != "rate"
 
     @property
     def travel_diameters(self) -> float:
@@ -452,6 +452,38 @@ class CleanUp(Part):
     """Time without a fine that comes out which ends the clean-up, s, if given."""
     cap_s: ClassVar = InSI[float | None]("cap_ms", 1e-3)
     """Time at which the clean-up ends at the latest, s, if given."""
+
+
+class InvasionChoices(Part):
+    """[invasion], how the mud is let in: as spheres, or as size classes on the pore network.
+
+    With "network" these are all solids of the mud, also those below `fines.cut_um`.
+    """
+
+    method: Literal["liggghts", "network", "both"] = "liggghts"
+    """"liggghts": every fine is a sphere. "network": the fast model, whose solids are
+    concentrations of size classes; `fdnet run --fast` asks for it. "both": spheres above
+    `fines.cut_um`, and what is finer as classes in the same flow."""
+    classes: Annotated[int, Field(ge=1, le=40)] = 8
+    """Size classes, equal over the logarithm of the diameter."""
+    sticking: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Share of the contacts of fines with grains that stick; 0 leaves attachment out."""
+
+
+class MudCake(Part):
+    """[cake], the measured cake of the mud, for invasion.method = "network" or "both".
+
+    Clay and colloids make a mud's cake some million times tighter than its coarse solids do alone.
+    """
+
+    permeability_m2: Annotated[float, Field(gt=0, le=1e-9)] | None = None
+    """Permeability of the cake. When absent, without a filtrate too: that of Carman and Kozeny for
+    the classes in it."""
+    api_filtrate_mL: Positive | None = None
+    """Filtrate of the API's press instead: 30 minutes at 690 kPa through 45.8 cm2."""
+
+    api_filtrate_m3: ClassVar = InSI[float | None]("api_filtrate_mL", 1e-6)
+    """Filtrate of the API's press, m3, if given."""
 
 
 def _count_or_edges(value: Any) -> str:

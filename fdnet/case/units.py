@@ -25,6 +25,9 @@ _FACTORS = {
     "D": _DARCY,
     "mD": _DARCY / 1000,
     "ft/min": 12 * _INCH / 60,
+    "ml/min": Decimal("1e-6") / 60,
+    "mL/min": Decimal("1e-6") / 60,
+    "cc/min": Decimal("1e-6") / 60,
 }
 _UNITS = """
 length: m 1, cm 0.01, mm 1e-3, um 1e-6, micron 1e-6, microns 1e-6, nm 1e-9, in 0.0254,
@@ -33,7 +36,9 @@ pressure: Pa 1, kPa 1e3, MPa 1e6, GPa 1e9, bar 1e5, atm 101325, psi, ksi, J/m3 1
 viscosity: Pa s 1, mPa s 1e-3, cP 1e-3, P 0.1
 density: kg/m3 1, g/cm3 1000, g/cc 1000, g/ml 1000, kg/l 1000, g/l 1, lb/bbl, lb/gal, ppg, lb/ft3
 permeability: m2 1, um2 1e-12, D, mD
+volume: m3 1, l 1e-3, L 1e-3, ml 1e-6, mL 1e-6, cc 1e-6, cm3 1e-6
 time: s 1, ms 1e-3, us 1e-6, min 60, h 3600, hours 3600
+flow rate: m3/s 1, ml/s 1e-6, ml/min, mL/min, cc/min
 velocity: m/s 1, cm/s 0.01, mm/s 1e-3, ft/s 0.3048, ft/min
 acceleration: m/s2 1
 stiffness: N/m 1, kN/m 1e3, MN/m 1e6, GN/m 1e9
@@ -65,6 +70,7 @@ SUFFIXES = {
         ("pressure", "J_m3", "J/m3"),
         ("acceleration", "m_s2", "m/s2"),
         ("stiffness", "N_m", "N/m"),
+        ("flow rate", "m3_s", "m3/s"),
         ("velocity", "m_s", "m/s"),
         ("pressure", "GPa", "GPa"),
         ("pressure", "MPa", "MPa"),
@@ -77,6 +83,8 @@ SUFFIXES = {
         ("time", "hours", "hours"),
         ("share", "percent", "%"),
         ("time", "s", "s"),
+        ("permeability", "m2", "m2"),
+        ("volume", "m3", "m3"),
         ("length", "m", "m"),
     )
 }

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.commands.options import THE_CASE, case_of, new_command, stages_of
+from fdnet.commands.options import OUTPUT, THE_CASE, case_of, new_command, stages_of
 from fdnet.errors import CaseError
 from fdnet.files import path_option
 
@@ -24,6 +24,10 @@ _ENGINE = (
     *("--out", "--stages", "--rank-by", "--json", "--quiet"),
     *("--np", "--liggghts", "--launcher", "--timeout"),
     *("--jobs", "--jobs-limit", "--engine", "--slurm", "--until", "--max-seeds", "--gather"),
+)
+_DRY = (
+    "--dry-run",
+    "run and write nothing; print how long the runs take, and what they leave out",
 )
 
 
@@ -86,7 +90,11 @@ def _run_campaign(
 ) -> int:
     """Carry out a plan and write its results; returns the exit code."""
     from fdnet.campaign.api import carry_out
+    from fdnet.campaign.plan import plan_lines
 
+    if options.dry_run:
+        print("\n".join(plan_lines(plan)))
+        return 0
     comparison = carry_out(
         Path(options.out),
         plan,
@@ -112,6 +120,7 @@ def add_campaign_commands(commands: Any) -> None:
     number = "number of seeds, from that of the case on (default 4)"
     parser.add(THE_CASE, "--seeds N", number, int, 4)
     parser.share(*_ENGINE)
+    parser.add(OUTPUT, *_DRY)
 
     about = "run and compare the cases and seeds of a file, and rank them by its targets"
     example = "fdnet sweep cases/sweeps/bridging.toml --out runs/bridging"
@@ -119,6 +128,7 @@ def add_campaign_commands(commands: Any) -> None:
     file = "the sweep file; with [targets] the variants are ranked by whether they meet them"
     parser.add(THE_CASE, "sweep SWEEP.toml", file, path_option)
     parser.share(*_ENGINE)
+    parser.add(OUTPUT, *_DRY)
 
     about = "compare finished runs, with 95 % bands over seeds"
     example = "fdnet compare runs/thin runs/thick --out runs/compared"

@@ -42,7 +42,7 @@ def add_init(commands: Any) -> None:
 def _init(options: argparse.Namespace) -> int:
     from fdnet.files import refuse_present, write_new
     from fdnet.scales.clock import spoken_time
-    from fdnet.scales.design import case_text, left_out
+    from fdnet.scales.design import case_text, taken
 
     if options.list or getattr(options, "from") is not None:
         return _shipped(options)
@@ -52,7 +52,7 @@ def _init(options: argparse.Namespace) -> int:
     design = _designed(options, name, out)
     write_new(out, case_text(design), force=options.force)
     print(f"{out}: written, expected to take {spoken_time(design.seconds)} on one core")
-    for text in left_out(design):
+    for text in taken(design):
         print(f"  {text}")
     print(f"  fdnet check {out}    what is odd, time and memory")
     print(f"  fdnet run {out}      the answer, in runs/{name}/report.html")

@@ -136,7 +136,7 @@ _ROWS: tuple[tuple[Any, ...], ...] = (
     ),
     (
         *(LIGGGHTS, "--timeout SECONDS"),
-        "stop LIGGGHTS after this time (continue with --resume)",
+        "stop LIGGGHTS after this time in a stage (continue with --resume)",
         float,
     ),
     (

@@ -263,7 +263,9 @@ def _along(axis: str, given: "SphereFile", options: argparse.Namespace) -> list[
     around = (periodic[along], periodic[(along + 1) % 3], periodic[(along + 2) % 3])
     notes = list(given.warnings)
     if given.around_grains:
-        notes.append(Doubt("no-box", "no --box given: the box around all grains was used"))
+        walled = "".join(one for one, yes in zip("xyz", periodic, strict=True) if not yes)
+        walls = ", with walls across the flow" if set(walled) - {axis} else ""
+        notes.append(Doubt("no-box", f"no --box given: the box around all grains was used{walls}"))
     notes += pack_doubts(given.spheres, axis, options.walls)
     facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
     rows: list[dict[str, Any]] = []
@@ -340,8 +342,8 @@ def _sides(periodic: tuple[bool, bool, bool], options: argparse.Namespace) -> st
     what = "hold the fluid" if options.walls == "no-slip" else "let the fluid slip"
     if options.axis == ALL_AXES:
         across = [f"{name} periodic" for name, yes in zip("xyz", periodic, strict=True) if yes]
-        walls = f"the other sides: walls that {what}"
-        return "; ".join(["along each axis: inlet and outlet", *across, walls])
+        walls = [] if all(periodic) else [f"the other sides: walls that {what}"]
+        return "; ".join(["along each axis: inlet and outlet", *across, *walls])
     others = [(k, name) for k, name in enumerate("xyz") if name != options.axis]
     walled = ", ".join(name for k, name in others if not periodic[k])
     repeated = ", ".join(name for k, name in others if periodic[k])

@@ -8,7 +8,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.commands.options import LIGGGHTS, OUTPUT, case_of, new_command, stages_of
+from fdnet.commands.options import (
+    LIGGGHTS,
+    OUTPUT,
+    THE_CASE,
+    case_of,
+    new_command,
+    stages_of,
+)
 from fdnet.errors import PAGE, CaseError
 from fdnet.files import path_option
 
@@ -35,6 +42,8 @@ def add_case_commands(commands: Any) -> None:
     run.add(OUTPUT, "--out DIR", "run folder (default runs/NAME)", path_option)
     run.add(OUTPUT, "--resume", "continue an unfinished run")
     run.share("--force", "--stages", "--json", "--quiet")
+    fast = "the fast model: size classes on the pore network instead of spheres in LIGGGHTS"
+    run.add(THE_CASE, "--fast", fast)
     dry = "run and write nothing; print velocities, time steps and what is odd"
     run.add(OUTPUT, "--dry-run", dry)
 
@@ -121,6 +130,8 @@ def _run(options: argparse.Namespace) -> int:
     from fdnet.run.pipeline import run_stages
     from fdnet.run.records import RunOptions, cores
 
+    if options.fast:
+        options.set.append('invasion.method="network"')
     case = case_of(options)
     if options.dry_run:
         _refuse_refused(_print_scales(case))

@@ -26,6 +26,7 @@ from fdnet.dem.supply import Batches, batches_of
 from fdnet.errors import CaseError, Doubt, DumpError, LiggghtsError, explained
 from fdnet.files import write_text
 from fdnet.scales.clock import ARRIVALS, PRESSED, arrival_time, rises
+from fdnet.scales.contacts import two_digits_up
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.geometry import groups_apart, max_overlap
@@ -34,7 +35,7 @@ from fdnet.spheres.snapshot import Snapshot
 HISTORY, UPDATES, WATCH = "history.csv", "updates.csv", "overlap.csv"
 DOUBTS = "doubts.txt"
 """Warnings of the sessions that went on from an earlier checkpoint than they could."""
-_SUFFIXES = "dump|restart|unreadable|record"
+_SUFFIXES = "dump|restart|npz|unreadable|record"
 
 
 class Checkpoint(NamedTuple):
@@ -94,6 +95,7 @@ class Record(NamedTuple):
         dump: the dump.
         restart: the restart.
         updates: the updates of a coupled stage before the checkpoint.
+        fluid: what the fluid of a coupled stage remembers; "" where that is nothing.
         fdnet: version of fdnet, whose forces these are; "" by a version that did not record it.
     """
 
@@ -104,6 +106,7 @@ class Record(NamedTuple):
     dump: str
     restart: str
     updates: str
+    fluid: str = ""
     fdnet: str = ""
 
 
@@ -155,16 +158,17 @@ class Checkpoints:
             case=self.digest,
             ranks=ranks,
             row=csv_row(row),
-            overlap=_digest(overlaps),
+            overlap=rows_digest(overlaps),
             fdnet=fdnet_version(),
             **self._digests(row.step),
         )
         self.store(row.step, record)
 
     def remove_restarts(self, step: int) -> None:
-        """Remove the restarts before `step`, but for the two newest."""
-        for _, old in [one for one in self.files("restart") if one[0] <= step][:-2]:
-            old.unlink(missing_ok=True)
+        """Remove the restarts before `step`, but for the two newest, and what goes with them."""
+        for suffix in ("restart", "npz"):
+            for _, old in [one for one in self.files(suffix) if one[0] <= step][:-2]:
+                old.unlink(missing_ok=True)
 
     def _digests(self, step: int) -> dict[str, str]:
         """Digests of the files of a checkpoint. Raises OSError where one cannot be read."""
@@ -173,7 +177,9 @@ class Checkpoints:
         except (LiggghtsError, KeyError):
             updates = [{"unreadable": 0.0}]
         files = {name: file_digest(self.path(step, name)) for name in ("dump", "restart")}
-        return files | {"updates": _digest([sorted(row.items()) for row in updates])}
+        memory = self.path(step, "npz")
+        files["fluid"] = file_digest(memory) if memory.exists() else ""
+        return files | {"updates": rows_digest([sorted(row.items()) for row in updates])}
 
     def last(self) -> Any | None:
         """The newest checkpoint that is as it was recorded; None without one.
@@ -200,16 +206,16 @@ class Checkpoints:
         usable = []
         for row, overlaps in zip(rows, parts, strict=False):
             record = records.get(row.step)
-            if not record or (record.case, record.overlap) != (self.digest, _digest(overlaps)):
+            if not record or (record.case, record.overlap) != (self.digest, rows_digest(overlaps)):
                 break
             usable.append((row, record))
         return next((row for row, record in reversed(usable) if self._is_whole(row, record)), None)
 
-    def has_its_dump(self, step: int) -> bool:
-        """Whether the dump of a checkpoint is as it was recorded."""
+    def holds(self, step: int, suffix: str) -> bool:
+        """Whether the "dump" or "restart" of a checkpoint is as it was recorded."""
         record = self.record(step)
         try:
-            return record is not None and file_digest(self.path(step, "dump")) == record.dump
+            return file_digest(self.path(step, suffix)) == getattr(record, suffix, None)
         except OSError:
             return False
 
@@ -304,7 +310,7 @@ def file_digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _digest(rows: Sequence[Any]) -> str:
+def rows_digest(rows: Sequence[Any]) -> str:
     """SHA-256 of some rows of numbers."""
     return hashlib.sha256("".join(f"{row!r}\n" for row in rows).encode()).hexdigest()
 
@@ -403,7 +409,7 @@ def quiet_enough(
     are no mud: they say nothing of the face.
     """
     waiting = row.upstream - row.removed_upstream
-    follows = case.drag.field == "network"
+    follows = case.drag.coupled
     mud = waiting >= ARRIVALS if follows else waiting > 0
     if row.quiet < (quiet_chunks(scales) if mud else empty_chunks(case, scales)):
         return False
@@ -637,31 +643,6 @@ def cut_watch(folder: Path, last_step: int) -> None:
         write_text(folder / WATCH, "".join(f"{row.step},{row.fraction!r}\n" for row in rows))
 
 
-class WatchReader:
-    """Reads what is new in overlap.csv, at each checkpoint of a run.
-
-    It begins at the end of the file, which holds what earlier sessions measured.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self.path = folder / WATCH
-        self.waiting: list[Deepest] = []
-        self.offset = self.path.stat().st_size if self.path.exists() else 0
-
-    def upto(self, step: int) -> list[Deepest]:
-        """The new rows up to `step`; later ones are kept for the next checkpoint."""
-        if self.path.exists():
-            with self.path.open("rb") as file:
-                file.seek(self.offset)
-                text = file.read()
-            whole = text[: text.rfind(b"\n") + 1]
-            self.offset += len(whole)
-            self.waiting += _watched(whole.decode(errors="replace").splitlines())
-        rows = [row for row in self.waiting if row.step <= step]
-        self.waiting = [row for row in self.waiting if row.step > step]
-        return rows
-
-
 def overlap_in(case: Case, state: Snapshot) -> Deepest:
     """The largest overlap of a fine in a state."""
     return Deepest(state.step, max_overlap(state, case.periodic, only_fines=True))
@@ -672,11 +653,16 @@ def deepest_of(seen: Iterable[Deepest]) -> Deepest:
     return max(seen, key=lambda row: row.fraction, default=Deepest(0, 0.0))
 
 
-def overlap_text(case: Case, deepest: Deepest) -> str:
-    """The overlap and its limit, in words."""
+def overlap_text(case: Case, deepest: Deepest, stiffness: float) -> str:
+    """The overlap, its limit and what to do, in words; springs ended at a `stiffness` of N/m."""
+    stiffer = "raise run.stiffness_N_m"
+    if isinstance(case.run.stiffness_N_m, str):
+        power = 1.5 if case.contact.model == "hertz" else 1.0
+        enough = two_digits_up((deepest.fraction / PRESSED) ** power * stiffness)
+        stiffer = f"set run.stiffness_N_m = {enough:.2g}"
     return (
         f"a fine overlapped by {100 * deepest.fraction:.3g} % of the smaller diameter at step "
-        f"{deepest.step} (limit run.max_overlap, {100 * case.run.max_overlap:.3g} %)"
+        f"{deepest.step} (limit run.max_overlap, {100 * case.run.max_overlap:.3g} %): {stiffer}"
     )
 
 

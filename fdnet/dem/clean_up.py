@@ -12,7 +12,6 @@ from fdnet.dem.checkpoint import (
     HISTORY,
     Checkpoints,
     Cleaned,
-    file_digest,
     read_history,
     state_at,
 )
@@ -140,12 +139,7 @@ class CleanUpStage(ChunkedStage):
         if last is None:
             before = Checkpoints(folder=start.invasion, digest=case.digest("invade"))
             path = before.path(self.first_step, "restart")
-            record = before.record(self.first_step)
-            try:
-                same = record is not None and file_digest(path) == record.restart
-            except OSError:
-                same = False
-            if not same:
+            if not before.holds(self.first_step, "restart"):
                 raise CaseError(
                     f"{path}: the clean-up begins with this file, and it is missing or is not the "
                     "one that the invasion wrote; put it back, or run the invasion again with "

@@ -118,6 +118,12 @@ class DrivingFluid(Protocol):
     def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
         """What acts on the fines of `spheres`, in their order."""
 
+    def keep(self, path: Path) -> None:
+        """Write what the next answer needs and spheres and rows do not say, if there is any."""
+
+    def recall(self, path: Path | None) -> None:
+        """Read it back; begin anew without a path."""
+
 
 SHOWN_COLUMNS = " ".join((COLUMNS, "density", *GIVEN))
 """Columns of the state that LIGGGHTS shows."""
@@ -335,7 +341,7 @@ def render_invade(
             # they follow from the distance that it has moved
             "feeding": {"first": AT_ONCE, "last": batches - 1} if batches > AT_ONCE else None,
             "slowed": case.drag.slowed,
-            "follows": case.drag.field == "network",
+            "follows": case.drag.coupled,
             "supply": SUPPLY,
             "chunks": chunks_of(case, scales),
             "stop_when_plugged": case.run.duration_s is None,
@@ -349,7 +355,7 @@ def moving_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, An
     mobile = case.grains.motion == "mobile"
     # a skin of 0.3 to 0.8 of the diameter of the smallest fine was measured to be fastest; where
     # the flow follows the deposit, steps are short and most fines stand: a fifth of the time less
-    skin = (0.3 if case.drag.field == "network" else 1.0) * case.fines.radius_range_m[0]
+    skin = (0.3 if case.drag.coupled else 1.0) * case.fines.radius_range_m[0]
     skin = skin if case.run.skin_m is None else case.run.skin_m
     walls = _friction(case, scales, walls_only=True)
     return dump_variables(case) | {

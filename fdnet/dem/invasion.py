@@ -9,11 +9,11 @@ up, as in a stage that is not coupled; so a cut one goes on bit for bit.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from fdnet.dem.checkpoint import (
     Checkpoints,
     Deepest,
     Updates,
-    WatchReader,
     chunks_of,
     deepest_of,
     entered_by,
@@ -153,7 +152,7 @@ class ChunkedStage(ABC):
                 self.look_at(read_history(self.folder, self.points.kind), read_watch(self.folder))
                 if self.over(last):
                     return deck, runs
-            launch = replace(self.launch, follow=self.keeper())
+            launch = replace(self.launch, follow=self.follow)
             screen = self.folder / SCREEN
             screen.unlink(missing_ok=True)
             try:
@@ -173,32 +172,29 @@ class ChunkedStage(ABC):
             finally:
                 (self.folder / SCRATCH).unlink(missing_ok=True)
 
-    def keeper(self) -> Callable[[str], None]:
-        """What follows the screen and passes every line on.
+    def follow(self, line: str) -> None:
+        """Follow the screen and pass every line on.
 
         At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a
         run that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on
         after a failed write and ends with exit code 0. Older restarts are removed only while there
         is room on the disk.
         """
-        watch = WatchReader(self.folder)
+        if line.startswith(self.mark):
+            self._keep(int(line.split()[3]))
+        if self.launch.follow:
+            self.launch.follow(line)
 
-        def follow(line: str) -> None:
-            if line.startswith(self.mark):
-                self._keep(int(line.split()[3]), watch)
-            if self.launch.follow:
-                self.launch.follow(line)
-
-        return follow
-
-    def _keep(self, step: int, watch: WatchReader) -> None:
+    def _keep(self, step: int) -> None:
         if disk_is_full(self.folder):
             raise LiggghtsError(
                 f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
                 "continue with --resume"
             )
-        rows = [row for row in read_rows(self.folder, self.points.kind) if row.step == step][-1:]
-        overlaps = watch.upto(step)
+        past = [row for row in read_rows(self.folder, self.points.kind) if row.step <= step]
+        rows = [row for row in past if row.step == step][-1:]
+        since = max((row.step for row in past if row.step < step), default=-1)
+        overlaps = [one for one in read_watch(self.folder) if since < one.step <= step]
         for row in rows:
             self.points.keep(row, ranks=self.launch.ranks, overlaps=overlaps)
         if not rows and self.points.stage == "invade" and self.case.run.on_overlap == "stop":
@@ -217,6 +213,7 @@ class ChunkedStage(ABC):
         assert self.fluid is not None
         updates = Updates(self.folder, self.fluid.measured, upto=last.step if last else 0)
         step, pace = last.step if last else self.first_step, self.pace(last)
+        self.fluid.recall(self.points.path(step, "npz") if last else None)
         feed(f"include {name}")
         while last is None or not self.over(last):
             if self.pace(last) != pace:
@@ -227,6 +224,7 @@ class ChunkedStage(ABC):
                 steps = self._update(feed, updates, last, pace, end - step)
                 feed(f"run {steps}" + ("" if fresh else " pre no post no"))
                 step, fresh = step + steps, False
+            self.fluid.keep(self.points.path(step, "npz"))
             feed("include checkpoint.in")
             last = read_history(self.folder, self.points.kind)[-1]
 
@@ -247,14 +245,13 @@ class ChunkedStage(ABC):
         time = self.time_at(last, done * self.scales.checkpoint_steps / pace.checkpoint_steps)
         frame, dt = self.shown(feed), pace.time_step
         spheres, density = self.spheres(frame, time), fine_density(frame)
-        shows = GIVEN[0] in frame.columns
         moment = Moment(
             step=step,
             time=time,
             before=updates.last,
             fresh=done == 0,
             left=left * dt,
-            given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0) if shows else None,
+            given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0),
             density=density,
         )
         assert self.fluid is not None
@@ -321,23 +318,15 @@ class Invasion(EndedStage):
 
     Attributes:
         supplied: number of fines that took part: all, or those of the batches that had come.
+        last: the scales of the last chunk: its step and its springs.
         overlap: largest overlap of a fine with any sphere.
         updates: the record of a coupled invasion, one row an update; empty when it is not coupled.
     """
 
     supplied: int
+    last: InvasionScales
     overlap: Deepest
     updates: tuple[Mapping[str, float], ...]
-
-    @property
-    def damaged(self) -> Snapshot:
-        """Grains and remaining fines at the end, those upstream too."""
-        return self.state
-
-    @property
-    def max_overlap(self) -> float:
-        """Largest overlap of a fine with any sphere, over the smaller diameter."""
-        return self.overlap.fraction
 
 
 class InvadeStage(ChunkedStage):
@@ -382,7 +371,7 @@ class InvadeStage(ChunkedStage):
         def lasting(first: int, row: Checkpoint) -> float:
             seen = [one.fraction for one in watched if first < one.step <= row.step]
             if not seen:
-                if row is not last and not self.points.has_its_dump(row.step):
+                if row is not last and not self.points.holds(row.step, "dump"):
                     raise LiggghtsError(
                         f"{self.points.path(row.step, 'dump')}: is missing, or not as it was "
                         "recorded, and the springs of the next chunk follow from it; put it back, "
@@ -408,10 +397,10 @@ class InvadeStage(ChunkedStage):
         deepest = deepest_of([*overlaps, *(overlap_in(case, state) for _, state in states)])
         if deepest.fraction > case.run.max_overlap:
             raise LiggghtsError(
-                f"{self.folder}: {overlap_text(case, deepest)}; stopped at checkpoint "
-                f"{history[-1].chunk} (step {history[-1].step}) because of run.on_overlap = "
-                "'stop'; raise run.stiffness_N_m and start over with --force, or go on from here "
-                "with --resume --set run.on_overlap=warn (or a larger run.max_overlap)"
+                f"{self.folder}: {overlap_text(case, deepest, self.pace(history[-1]).stiffness)}, "
+                f"and start over with --force; stopped at checkpoint {history[-1].chunk} (step "
+                f"{history[-1].step}) because of run.on_overlap = 'stop'; go on from here with "
+                "--resume --set run.on_overlap=warn (or a larger run.max_overlap)"
             )
 
     def begin_chunk(self, feed: Feed, updates: Updates, last: Checkpoint | None) -> None:
@@ -518,8 +507,8 @@ def invade(
     deck, runs = stage.drive()
     history = read_history(folder)
     reason, warnings = stage.ending(history)
-    made = (warnings + points.doubts(), deck.left_out, runs, launch.ranks)
-    return _read(case, scales, grains, folder, history, reason, *made)
+    ended = _Ended(reason, warnings + points.doubts(), launch.ranks, deck.left_out, runs)
+    return _read(case, scales, grains, folder, history, ended)
 
 
 def invasion_so_far(
@@ -535,8 +524,18 @@ def invasion_so_far(
     if last is None or record is None:
         return None
     history = tuple(row for row in read_history(folder) if row.step <= last.step)
-    made = (points.doubts(), (), (), record.ranks)
-    return _read(case, scales, grains, folder, history, "unfinished", *made)
+    ended = _Ended("unfinished", points.doubts(), record.ranks)
+    return _read(case, scales, grains, folder, history, ended)
+
+
+class _Ended(NamedTuple):
+    """How an invasion ended; the fields are those of `EndedStage`."""
+
+    stop_reason: str
+    warnings: list[str]
+    ranks: int
+    left_out: tuple[LeftOut, ...] = ()
+    runs: tuple[Execution, ...] = ()
 
 
 def _read(
@@ -545,11 +544,7 @@ def _read(
     grains: Snapshot,
     folder: Path,
     history: tuple[Checkpoint, ...],
-    reason: str,
-    warnings: list[str],
-    left_out: tuple[LeftOut, ...],
-    runs: tuple[Execution, ...],
-    ranks: int,
+    ended: _Ended,
 ) -> Invasion:
     """The invasion whose files are in `folder`, up to the last checkpoint of the `history`."""
     batches, step = batches_of(case, scales), history[-1].step
@@ -557,23 +552,21 @@ def _read(
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
     if len(overlaps) < len(history):
-        warnings.append(
+        ended.warnings.append(
             Doubt(
                 "dumps-cannot-be-read",
                 f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be "
                 "read: they are missing from the largest overlap and from invasion.pvd",
             )
         )
+    begun = history[-2].step if len(history) > 1 else 0
     return Invasion(
+        **ended._asdict() | {"warnings": tuple(ended.warnings)},
         state=damaged,
         history=history,
-        stop_reason=reason,
+        last=stiffened(case, scales, step - begun),
         supplied=batches.supplied(entered_by(case, batches, history[-1])),
         overlap=deepest_of([*overlaps, *(one for one in read_watch(folder) if one.step <= step)]),
         step_s=scales.time_step,
-        left_out=left_out,
-        warnings=tuple(warnings),
-        ranks=ranks,
-        runs=runs,
         updates=tuple(row for row in read_updates(folder) if row["step"] < step),
     )

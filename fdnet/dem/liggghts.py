@@ -346,13 +346,13 @@ class Launch:
     Attributes:
         binary: LIGGGHTS.
         ranks: MPI ranks.
-        timeout: s, time limit of one deck; None: no limit.
+        deadline: s of the monotonic clock, when LIGGGHTS is stopped; None: never.
         follow: is called with each new line that LIGGGHTS prints.
     """
 
     binary: Binary
     ranks: int = 1
-    timeout: float | None = None
+    deadline: float | None = None
     follow: Callable[[str], None] | None = None
 
 
@@ -543,13 +543,16 @@ def run_deck(
         raise LiggghtsError(f"{folder / deck}: deck not found; render it first")
     command = launch.binary.command(deck if play is None else None, launch.ranks)
     start = time.monotonic()
-    deadline = None if launch.timeout is None else start + launch.timeout
     with (
         started(folder, command, ranks=launch.ranks, fed=play is not None) as process,
         (folder / SCREEN).open("wb", buffering=0) as screen,
     ):
         feed = Feed(
-            process=process, folder=folder, screen=screen, follow=launch.follow, deadline=deadline
+            process=process,
+            folder=folder,
+            screen=screen,
+            follow=launch.follow,
+            deadline=launch.deadline,
         )
         try:
             feed.play(play)

@@ -644,16 +644,15 @@ def fill_clean_up(
 
 def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
     """Porosity and permeability of the slices of the cake, against the distance from the face."""
-    left, right = figure.subplots(1, 2)
+    above, below = figure.subplots(2, 1, sharex=True)
     edges = np.array([-row["x_hi_m"] for row in rows] + [-rows[-1]["x_lo_m"]])
-    stairs(left, edges, [row["porosity"] for row in rows], color=BLUE)
-    left.set(ylabel="porosity (–)", ylim=(0, 1))
+    stairs(above, edges, [row["porosity"] for row in rows], color=BLUE)
+    above.set(ylabel="porosity (–)", ylim=(0, 1))
     k = np.array([row["k_m2"] for row in rows], float) / MILLIDARCY
-    stairs(right, edges, k, color=BLUE)
-    right.set(ylabel="permeability (mD)", yscale="log")
-    plain_decades(right)
-    for axes in (left, right):
-        axes.set(xlabel="distance from the face (mm)", xlim=(0, MM * edges[-1]))
+    stairs(below, edges, k, color=BLUE)
+    below.set(ylabel="permeability (mD)", yscale="log")
+    plain_decades(below)
+    below.set(xlabel="distance from the face (mm)", xlim=(0, MM * edges[-1]))
 
 
 def fill_filtrate(

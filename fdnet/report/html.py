@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -103,16 +102,14 @@ def mechanics_html(folder: Path) -> str:
         return ""
     advice = "measure it anew with fdnet mechanics, or remove the folder"
     numbers = read_json(path, Mechanics, noun="result of fdnet mechanics", advice=advice)
-    parts = [_table(numbers, Mechanics)]
-    if numbers.get("warnings"):
-        items = "".join(f"<li>{words(text)}</li>" for text in numbers["warnings"])
-        parts.append(f'<div class="warnings"><ul>{items}</ul></div>')
-    if numbers.get("triaxial"):
-        parts += ["<h3>Triaxial test</h3>", _table(numbers["triaxial"], _Test)]
-    figure = folder / "stress_strain.png"
-    if numbers.get("triaxial") and figure.is_file():
-        parts.append(f'<figure><img src="{_data_uri(figure)}" alt="{figure.stem}"></figure>')
-    return _folded("Mechanics of the pack", "\n".join(parts))
+    figure, tested = folder / "stress_strain.png", numbers.get("triaxial")
+    return page_text(
+        "report/mechanics.html.j2",
+        elastic=_values(numbers, Mechanics),
+        warnings=numbers.get("warnings") or [],
+        triaxial=_values(tested, _Test) if tested else [],
+        figure=shown_figure(figure, figure.stem) if tested and figure.is_file() else None,
+    )
 
 
 def put_mechanics(report: Path, folder: Path) -> bool:
@@ -120,20 +117,50 @@ def put_mechanics(report: Path, folder: Path) -> bool:
     return put_section(report, MECHANICS, mechanics_html(folder))
 
 
-def _table(numbers: dict[str, Any], model: type[JsonObject]) -> str:
-    """The numbers that have a `Line` in the model."""
-    cells = []
-    for key, field_of in model.model_fields.items():
-        for one in (known for known in field_of.metadata if isinstance(known, Line)):
-            value = quantity(multiplied(numbers[key], one.factor), one.unit)
-            cells.append(
-                f'<tr><th>{html.escape(one.name)}</th><td class="number">{value}</td></tr>'
-            )
-    return '<div class="scroll"><table>\n' + "\n".join(cells) + "\n</table></div>"
+def _values(numbers: dict[str, Any], model: type[JsonObject]) -> list[tuple[str, str]]:
+    """Name and text of the numbers that have a `Line` in the model."""
+    return [
+        (one.name, quantity(multiplied(numbers[key], one.factor), one.unit))
+        for key, known in model.model_fields.items()
+        for one in known.metadata
+        if isinstance(one, Line)
+    ]
 
 
-def _folded(title: str, content: str) -> str:
-    return f"<details><summary>{title}</summary>\n{content}\n</details>"
+# ------------------------------------------------------------------------------------------------
+# The section of the report on a core and a well; a report without it has none.
+
+
+FORMATION = "formation"
+
+
+class _ScaledUp(JsonObject):
+    """What core.json and well.json say in words."""
+
+    words: list[str]
+    warnings: list[str]
+
+
+def formation_html(folder: Path) -> str:
+    """The section as HTML from the files in the folder `formation`; "" where nothing was asked.
+
+    Raises CaseError where a file cannot be understood.
+    """
+    found, notes, advice = [], list[str](), "call fdnet core or fdnet well again"
+    for name, noun in (("well", "A well"), ("core", "A core")):
+        if (path := folder / f"{name}.json").is_file():
+            one = read_json(path, _ScaledUp, noun=f"result of fdnet {name}", advice=advice)
+            found.append((noun, one["words"]))
+            notes += one["warnings"]
+    if not found:
+        return ""
+    figure, caption = folder / "handed_up.svg", "the fit over the profile that it comes from"
+    return page_text(
+        "report/formation.html.j2",
+        found=found,
+        notes=list(dict.fromkeys(notes)),
+        figure=shown_figure(figure, caption) if figure.is_file() else None,
+    )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -141,52 +168,11 @@ def _folded(title: str, content: str) -> str:
 
 
 STOKES = "stokes"
-_HEAD = (
-    "depth (mm)",
-    "before, flow (mD)",
-    "before, network (mD)",
-    "after, flow (mD)",
-    "after, network (mD)",
-    "lost, flow",
-    "lost, network",
-    "cells of the flow (&micro;m)",
-)
-_NOTE = (
-    "Resolved flow solves the Stokes equations between all spheres on two grids and needs no law "
-    "of throats. The error behind &plusmn; is its own. The columns &ldquo;network&rdquo; hold "
-    "what the run has. Where the two differ by more than that error, the difference is the error "
-    "of the network. Cells are those of the finer grid, before and after. The damage law of the "
-    "network is {}."
-)
 
 
 def stokes_html(rows: Sequence[Mapping[str, Any]]) -> str:
     """The section as HTML, one row for each section that was resolved."""
-
-    def lost(value: float | None) -> str:
-        return "&ndash;" if value is None else f"{value:.1%}"
-
-    lines = [
-        [
-            f"{1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g}",
-            f"{in_millidarcy(row['k_initial_m2'])} &plusmn; {row['k_initial_error']:.1%}",
-            in_millidarcy(row["network_k_initial_m2"]),
-            f"{in_millidarcy(row['k_damaged_m2'])} &plusmn; {row['k_damaged_error']:.1%}",
-            in_millidarcy(row["network_k_damaged_m2"]),
-            lost(row["k_reduction"]),
-            lost(row["network_k_reduction"]),
-            f"{1e6 * row['cell_initial_m']:.3g}, {1e6 * row['cell_damaged_m']:.3g}",
-        ]
-        for row in rows
-    ]
-    head = "".join(f'<th class="number">{name}</th>' for name in _HEAD)
-    cells = ["".join(f'<td class="number">{text}</td>' for text in line) for line in lines]
-    body = "\n".join(f"<tr>{line}</tr>" for line in cells)
-    return _folded(
-        "Sections by resolved Stokes flow",
-        f'<div class="scroll"><table>\n<tr>{head}</tr>\n{body}\n</table></div>\n'
-        f'<p class="note">{_NOTE.format(rows[0]["network_damage_law"])}</p>',
-    )
+    return page_text("report/stokes.html.j2", rows=rows)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -247,29 +233,41 @@ def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportP
 
     Raises CaseError for a figure that cannot be read.
     """
-    from jinja2 import Environment, StrictUndefined
-
-    page = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    for one in (quantity, in_millidarcy, percent, multiplied, words):
-        page.filters[one.__name__] = one
-    page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
-    page.globals.update(shows=SHOWS, agrees=AGREES, columns=SECTION_COLUMNS)
-    figures = [
-        {"data": _data_uri(Path(file)), "caption": caption, "name": Path(file).name}
-        for file, caption in parts.figures
-    ]
-    template = resources.files("fdnet.report").joinpath("report.html.j2").read_text("utf-8")
-    text = page.from_string(template).render(
+    figures = [shown_figure(Path(file), caption) for file, caption in parts.figures]
+    text = page_text(
+        "report/report.html.j2",
         summary=summary,
         parts=parts,
+        columns=SECTION_COLUMNS,
         figures=[one for one in figures if one["name"] not in (STILL, LEADING)],
         leading=[one for one in figures if one["name"] == LEADING],
         still=[one for one in figures if one["name"] == STILL],
         headline=list(facts(summary)) if "supplied_count" in summary else [],
     )
     return write_text(path, text)
+
+
+def page_text(template: str, **shown: Any) -> str:
+    """A page from its template, a path within fdnet; the style is that of page.html.j2."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    page = Environment(
+        loader=PackageLoader("fdnet", ""),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    for one in (quantity, in_millidarcy, percent, multiplied, words):
+        page.filters[one.__name__] = one
+    page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
+    page.globals.update(shows=SHOWS, agrees=AGREES)
+    return page.get_template(template).render(**shown)
+
+
+def shown_figure(path: Path, caption: str) -> dict[str, str]:
+    """A figure as the macro `show` takes it. Raises CaseError where it cannot be read."""
+    return {"data": _data_uri(path), "caption": caption, "name": path.name}
 
 
 def quantity(value: Any, unit: str = "") -> str:

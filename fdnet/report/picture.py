@@ -184,7 +184,7 @@ def refuse_suffix(target: Path) -> None:
     if target.suffix.lower() == ".mp4" and find_spec("imageio_ffmpeg") is None:
         raise CaseError(
             f"{target}: MP4 needs the package imageio-ffmpeg; install it with pip install "
-            "imageio-ffmpeg, or give a name that ends in .gif"
+            "'fdnet[movie]', or give a name that ends in .gif"
         )
 
 

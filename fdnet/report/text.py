@@ -139,13 +139,21 @@ def in_place_words(counts: Mapping[str, int]) -> str:
     )
 
 
+CAKE_LAWS = {
+    "beetstra": "by Beetstra's law of drag",
+    "carman-kozeny": "by Carman and Kozeny of the classes in it",
+    "given": "as the case gives it",
+}
+"""Where the permeability of a cake is from, by the name in the summary."""
+
+
 def cake_words(summary: Mapping[str, Any]) -> str:
     """How the cake lets the fluid through; `summary` has the keys of `cake_summary`."""
     cake, share = summary["cake"], percent(summary["cake_resistance_share"])
     if cake is None:
         return "no cake yet: no fine stands before the face"
     own = cake["no_cake_yet"] or (
-        f"{in_millidarcy(cake['k_m2'])} mD by Beetstra's law of drag at a porosity of "
+        f"{in_millidarcy(cake['k_m2'])} mD {CAKE_LAWS[cake['law']]} at a porosity of "
         f"{cake['porosity']:.2f}"
     )
     return f"{cake['fines']} fines, {own}; {share} % of the resistance of cake and specimen"
@@ -229,12 +237,16 @@ def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
         return
     final = "final" if summary["final"] else "not final"
     yield f"The result is {final}, because {summary['words']['end']}."
+    if "method_error" in summary:
+        what = "It is" if summary["method"] == "network" else "What is finer than the cut is"
+        yield f"{what} by the fast model of size classes: {summary['method_error']}."
     scatter = summary.get("scatter")
-    if scatter and summary.get("invaded_count"):
+    if scatter and summary.get("invaded_count") and summary["final"]:
+        own = "" if summary["case"] in scatter["source"] else ", and not of this case"
         yield (
             f"This is one run with one seed ({summary['seed']}); the ± are one standard deviation "
-            f"of {scatter['runs']} runs ({scatter['source']}). `fdnet ensemble CASE --seeds 8` "
-            "gives the band of your own case."
+            f"of {scatter['runs']} seeds of {scatter['source']}{own}. `fdnet ensemble CASE "
+            "--seeds 8` gives the band of your own case."
         )
 
 
@@ -301,9 +313,9 @@ def facts(summary: Mapping[str, Any]) -> Iterator[Fact]:
         )
     if flow is not None:
         yield Fact(
-            "flow",
+            "k of the flow",
             f"{percent(1 - flow)} % lost",
-            f"as the flow met it last: {FLOW_LAW} (k_over_k0 of history.csv)",
+            f"as the simulated flow met it last: {FLOW_LAW} (k_over_k0 of history.csv)",
         )
     porosity = f"{summary['porosity_initial']:.4f}"
     yield Fact(

@@ -162,13 +162,16 @@ def cake_rows(cake: Cake) -> list[dict[str, Any]]:
     ]
 
 
-def cake_summary(cake: Cake | None, pack: float) -> Mapping[str, Any]:
-    """The keys that the cake adds to summary.json; `pack` is the resistance of the pack, 1/m."""
+def cake_summary(cake: Cake | None, pack: float, finer: float = 0.0) -> Mapping[str, Any]:
+    """The keys that the cake adds to summary.json; `pack` is the resistance of the pack, 1/m.
+
+    Classes of `finer` solids lie in series with it, 1/m.
+    """
     if cake is None:
-        return {"cake_resistance_share": 0.0, "cake": None}
+        return {"cake_resistance_share": finer / (finer + pack), "cake": None}
     own, k = float(cake.resistance.sum()), cake.permeability
     return {
-        "cake_resistance_share": own / (own + pack),
+        "cake_resistance_share": (own + finer) / (own + finer + pack),
         "cake": {
             "fines": int(cake.count.sum()),
             "thickness_m": cake.thickness,

@@ -11,6 +11,7 @@ from fdnet.dem.invasion import invade, invasion_so_far
 from fdnet.dem.packing import check_radii, make_pack
 from fdnet.errors import CaseError, Doubt
 from fdnet.names import LIGGGHTS_STAGES
+from fdnet.run.by_classes import class_model, write_class_invasion
 from fdnet.run.fluid import fluid_of
 from fdnet.run.folder import START_OVER, check_files, may_be_gone
 from fdnet.run.progress import Forecast, Progress
@@ -51,6 +52,16 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     if is_done(session, "invade"):
         return
     scales, grains, folder = invasion_scales(case), packed_grains(session), session.path / "invade"
+    if case.by_classes:
+        with session.timed("invade"):
+            model = class_model(case, scales, grains)
+            record = write_class_invasion(case, model, folder)
+        spent = {
+            "seconds": session.seconds["invade"],
+            "cpu_seconds": session.cpu_seconds["invade"],
+        }
+        session.folder.finish("invade", record | spent)
+        return
     progress = Progress("invade", _forecast(case, scales), show=session.options.show_progress)
     with session.timed("invade"), progress:
         launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
@@ -67,6 +78,7 @@ def _forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
         plug=0 if case.run.duration_s is not None else round(scales.plug_time / step),
         cap=math.ceil(scales.cap_time / step),
         allowed=case.run.plug_rate * arrivals * step,
+        chunk=scales.checkpoint_steps,
     )
 
 

@@ -1,5 +1,6 @@
 """A finished run as an object: its numbers, tables, spheres, network and meshes."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -65,7 +66,7 @@ class FinishedRun:
         if name in self.summary:
             return self.summary[name]
         in_m2 = f"{name.removesuffix('_mD')}_m2"
-        if name.endswith("_mD") and in_m2 in self.summary:
+        if name.startswith("k_") and name.endswith("_mD") and in_m2 in self.summary:
             k = self.summary[in_m2]
             return None if k is None else millidarcy(k)
         near = get_close_matches(name, dir(self), 1)
@@ -73,7 +74,7 @@ class FinishedRun:
         raise AttributeError(f"a run of fdnet has no {name!r}{hint}")
 
     def __dir__(self) -> list[str]:
-        keys = [*self.summary, *(f"{k[:-3]}_mD" for k in self.summary if k.endswith("_m2"))]
+        keys = [*self.summary, *(f"{k[:-3]}_mD" for k in self.summary if re.match("k_.*_m2$", k))]
         return sorted({*super().__dir__(), *keys})
 
     @property

@@ -8,18 +8,27 @@ docs/physics.md, "The field of the network".
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from fdnet.case.case import InvasionCase
+from fdnet.classes.beside_spheres import (
+    CLASS_COLUMNS,
+    FinerClasses,
+    Narrowed,
+    Passed,
+    Stands,
+    finer_classes,
+)
 from fdnet.dem.checkpoint import Checkpoint, entered_by, time_of
 from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
-from fdnet.run.cake import standing_cake
+from fdnet.run.cake import Standing, standing_cake
 from fdnet.run.network_flow import (
     RENEWED,
     Carried,
@@ -34,9 +43,6 @@ from fdnet.scales.flow import darcy_through, path_of
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Snapshot
 
-CROWD_COLUMNS = ("factor_mean", "factor_most", "porosity_least", "porosity_capped")
-"""Mean and largest factor on the drag, least porosity, fines whose porosity was capped."""
-
 
 def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, slip: Array) -> Array:
     """Factor (N,) on the drag of lone fines of `radius` m and superficial `slip` m/s.
@@ -46,17 +52,6 @@ def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, sli
     reynolds = scales.push.reynolds_slope * radius / near.size_ratio * slip
     crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
     return crowd_drag_factor(crowd) / near.porosity
-
-
-def crowd_measures(factor: Array, near: Neighbourhood) -> dict[str, float]:
-    """`CROWD_COLUMNS`, from the `factor` (N,) on the drag of fines."""
-    values = (
-        float(np.mean(factor)) if len(factor) else 1.0,
-        float(np.max(factor, initial=1.0)),
-        float(np.min(near.porosity, initial=1.0)),
-        near.capped,
-    )
-    return dict(zip(CROWD_COLUMNS, values, strict=True))
 
 
 def _speed(velocity: Array) -> Array:
@@ -79,6 +74,12 @@ class Mirrored:
     """
 
     fluid: DrivingFluid
+
+    def keep(self, path: Path) -> None:
+        """Nothing: the flow turns back in cases of spheres alone."""
+
+    def recall(self, path: Path | None) -> None:
+        """Nothing, likewise."""
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -206,7 +207,7 @@ def history_rows(
                 "passed_count": row.passed,
                 "upstream_count": row.upstream,
                 "step": row.step,
-                **{name: flow[name] for name in FLOW_COLUMNS if name in flow},
+                **{name: flow[name] for name in FLOW_COLUMNS + CLASS_COLUMNS if name in flow},
             }
         )
     return rows
@@ -244,7 +245,8 @@ class NetworkFluid:
         return (
             "velocity_m_s",
             *FLOW_COLUMNS,
-            *CROWD_COLUMNS,
+            *(() if self.finer is None else CLASS_COLUMNS),
+            *("factor_mean", "factor_most", "porosity_least", "porosity_capped"),
             "pores_stagnant",
             "fines_standing",
         )
@@ -258,6 +260,24 @@ class NetworkFluid:
     def renewal(self) -> Renewal:
         """The damaged pack, from one update to the next."""
         return Renewal(self.pack, renewed=self.renewed)
+
+    @cached_property
+    def finer(self) -> FinerClasses | None:
+        """The solids finer than the cut, from one update to the next; None without any."""
+        if not self.case.with_classes:
+            return None
+        pack = self.pack
+        return finer_classes(self.case, self.scales, pack.network, pack.halves, pack.flow)
+
+    def keep(self, path: Path) -> None:
+        """Write what the next update needs of the finer solids."""
+        if self.finer is not None:
+            self.finer.keep(path)
+
+    def recall(self, path: Path | None) -> None:
+        """Go on from what was written."""
+        if self.finer is not None:
+            self.finer.recall(path) if path is not None else self.finer.forget()
 
     @cached_property
     def first_velocity(self) -> float:
@@ -295,7 +315,13 @@ class NetworkFluid:
         usual = before * _speed(intact)
         known = usual if moment.given is None else np.where(moment.given > 0, moment.given, usual)
         standing = _speed(fines.velocity) < self.standing * known
-        carried, deposit = self.renewal.of(measured.where(standing), anew=moment.fresh)
+        stack = standing_cake(spheres, self.case.periodic)
+        filtrate, finer = self._filtrate(moment), self.finer
+        among = None if finer is None else partial(self._among, moment, filtrate, stack)
+        stood = measured.where(standing)
+        carried, deposit = self.renewal.of(stood, anew=moment.fresh, finer=among)
+        if finer is not None:
+            finer.solve(carried.flow)
         near = local_porosity(spheres, self.case.periodic)
         share = pack.share_at(fines.position, carried)
         shape = intact * share[:, None]
@@ -311,7 +337,6 @@ class NetworkFluid:
         rows = order[np.searchsorted(fines.id[order], deposit.fines.id)]
         pressed[rows] = on_each_fine(carried.pressed, deposit)
         held = standing & within & np.any(pressed != 0.0, axis=1)
-        stack = standing_cake(spheres, self.case.periodic)
         cake = scales.push.coefficient / (6.0 * np.pi) * float(stack.resistance.sum())
         # the pack's own flow knows no cake: the forces on its fines add up to its pressure drop
         caked = standing & np.isin(fines.id, stack.fines.id)
@@ -319,7 +344,8 @@ class NetworkFluid:
         shape[caked] *= cake * pack.network.area / drawn if drawn > 0 else 1.0
         moving = np.where(within & ~held, crowd, 0.0) / pack.network.area
         slow, gain = float(moving @ shape[:, 0]), float(moving @ fines.velocity[:, 0])
-        speed = self._velocity(carried, cake + slow, gain)
+        more = 0.0 if finer is None else self._viscosity * finer.resistance
+        speed = self._velocity(carried, cake + more + slow, gain)
         # drops of pressure as simulated, Pa: of what moves in the pack, and of all that stands
         loose = slow * speed - gain
         drop = self._viscosity * speed * pack.length / pack.permeability / carried.k_over_k0
@@ -343,32 +369,50 @@ class NetworkFluid:
         on_grains, on_held = drop * float(carried.pressed.grains[0]), float(pressed[held, 0].sum())
         whole, law = (drop + loose) * pack.network.area, float(crowd[held] @ fluid[held, 0])
         # rates and pressures are those of the fluid itself, which is slower than a driven one
-        driven, filtrate = scales.force_factor, 0.0
-        if moment.before is not None:
-            passed = (moment.time - moment.before["time_s"]) * driven
-            filtrate = moment.before["filtrate_m3"] + moment.before["rate_m3_s"] * passed
+        driven = scales.force_factor
         return FluidForces(
             coefficient=coefficient,
             velocity=velocity,
             push=push,
             pace=speed / scales.porosity,
-            measures=crowd_measures(factor, near)
-            | {
+            measures={
                 "velocity_m_s": speed,
+                "factor_mean": float(np.mean(factor)) if len(factor) else 1.0,
+                "factor_most": float(np.max(factor, initial=1.0)),
+                "porosity_least": float(np.min(near.porosity, initial=1.0)),
+                "porosity_capped": near.capped,
                 "rate_m3_s": speed / driven * pack.network.area,
                 "rate_over_initial": speed / self.first_velocity,
                 "filtrate_m3": filtrate,
                 "k_over_k0": carried.k_over_k0,
-                "pressure_cake_Pa": cake * speed / driven,
+                "pressure_cake_Pa": (cake + more) * speed / driven,
                 "pressure_pack_Pa": (drop + loose) / driven,
                 "momentum_defect": _over(abs(on_fines + on_grains - whole), whole),
                 "fines_share": _over(on_held, whole),
                 "crowd_over_network": _over(law, on_held),
-                "cake_thickness_m": stack.thickness,
+                "cake_thickness_m": stack.thickness + (0.0 if finer is None else finer.thickness),
                 "pores_stagnant": carried.stagnant,
                 "fines_standing": int(np.sum(standing & within)),
+                **({} if finer is None else finer.measures),
             },
         )
+
+    def _filtrate(self, moment: Moment) -> float:
+        """m3 that have passed up to this moment, at the rate of the update before."""
+        if moment.before is None:
+            return 0.0
+        time = (moment.time - moment.before["time_s"]) * self.scales.force_factor
+        return moment.before["filtrate_m3"] + moment.before["rate_m3_s"] * time
+
+    def _among(
+        self, moment: Moment, filtrate: float, stack: Standing, kept: Array, in_pores: Array
+    ) -> Narrowed:
+        """What the finer solids leave of the sides that `kept` (T, 2) of their conductances."""
+        assert self.finer is not None
+        before = 0.0 if moment.before is None else moment.before["filtrate_m3"]
+        velocity = self._before(moment) / self.scales.force_factor
+        cake = float(4.0 / 3.0 * np.pi * np.sum(stack.fines.radius**3))
+        return self.finer.among(Passed(before, filtrate, velocity), Stands(kept, in_pores, cake))
 
     def _before(self, moment: Moment) -> float:
         """Superficial velocity up to this moment, m/s."""

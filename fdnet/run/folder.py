@@ -124,12 +124,20 @@ OUTPUTS = {
     "pack": ("pack", "mechanics"),
     "invade": ("invade", "stokes"),
     "clean_up": ("clean_up",),
-    "analyse": (*TABLES, *SOME_TABLES),
-    "report": ("figures", "frames", *MESHES, "spheres.pvd", "invasion.pvd", "report.html"),
+    "analyse": (*TABLES, *SOME_TABLES, "formation"),
+    "report": (
+        "figures",
+        "frames",
+        *MESHES,
+        "spheres.pvd",
+        "invasion.pvd",
+        "report.html",
+        "paraview_view.py",
+    ),
 }
 """Files and folders that each stage writes, below the run folder."""
-OPTIONAL = ("layers.csv", "history.csv", *SOME_TABLES)
-"""Those of them that a finished stage may lack."""
+OPTIONAL = ("layers.csv", "history.csv", *SOME_TABLES, "formation")
+"""Those of them that a finished stage may lack; `formation` is of `fdnet core` and `well`."""
 
 
 class _Execution(JsonObject):
@@ -155,6 +163,13 @@ class _Updates(JsonObject):
     count: int
     momentum_open: int = 0
     momentum_defect_most: float = 0.0
+
+
+class _Springs(JsonObject):
+    """The last time step, and the stiffness of the stiffest contact at first and last."""
+
+    dem_dt_last_s: float
+    stiffness_N_m: list[float]
 
 
 class StageRecord(JsonObject):
@@ -191,6 +206,7 @@ class InvadeRecord(StageRecord):
     max_overlap_step: int | None = None
     supplied: int
     updates: _Updates | None = None
+    springs: _Springs | None = None
     warnings: list[str]
 
 

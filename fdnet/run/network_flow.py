@@ -4,12 +4,13 @@ The derivation is on docs/physics.md, "The field of the network".
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from fdnet.classes.beside_spheres import Narrowed
 from fdnet.network import geometry
 from fdnet.network.field.field import VelocityField, velocity_field
 from fdnet.network.fines.deposit import (
@@ -102,12 +103,14 @@ class Carried:
         ratio: (P,) flux over that of the intact pack at the same rate through the specimen.
         stagnant: number of pores that carry next to nothing when clean; their ratio is 1.
         pressed: forces of the fluid on grains and fines over the drop of pressure.
+        flow: through the damaged network.
     """
 
     k_over_k0: float
     ratio: Array
     stagnant: int
     pressed: Pressed
+    flow: Flow
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -162,10 +165,11 @@ class PackFlow:
             return former.changed_to(fines)
         return measured_sections(self.network, fines, parts=self.parts, step=STEP)
 
-    def carried(self, kept: Array, fines: Array) -> Carried:
+    def carried(self, kept: Array, fines: Array, finer: Array | None = None) -> Carried:
         """What the pores carry when the sides have `kept` (T, 2) of their clean conductances.
 
-        `fines` (P,) m3 is the volume of the fines in each pore.
+        `fines` (P,) m3 is the volume of the fines in each pore, `finer` (G,) m3 that of solids
+        beside them in groups of pores.
         """
         factor = np.maximum(kept, LEAK)
         raised = np.sum(self.halves / factor, axis=1)
@@ -178,16 +182,18 @@ class PackFlow:
             k_over_k0=flow.inflow / self.flow.inflow,
             ratio=np.divide(share, self.through, out=np.ones_like(share), where=moving),
             stagnant=int(np.sum(~moving)),
-            pressed=self._pressed(factor, flow, fines),
+            pressed=self._pressed(factor, flow, fines, finer),
+            flow=flow,
         )
 
-    def _pressed(self, factor: Array, flow: Flow, fines: Array) -> Pressed:
+    def _pressed(self, factor: Array, flow: Flow, fines: Array, finer: Array | None) -> Pressed:
         """The forces in a `flow` on grains, and on fines in the pores.
 
         What the fines add to a side acts on those in its pore. A fine also narrows sides whose
         pores it does not reach: that acts on the fines in the pore behind the throat, and on the
         grains where that has none either. `factor` (T, 2) is the share that the sides keep of
-        their conductances, `fines` (P,) m3 the volume of the fines in each pore.
+        their conductances, `fines` (P,) m3 the volume of the fines in each pore. They bear what
+        acts on a pore by their share of its solids; `finer` ones hand theirs on to the grains.
         """
         first, second = flow.pore_pressure[self.network.throat_pores].T
         drop, raised = np.nan_to_num(first - second), self.halves / factor
@@ -198,6 +204,9 @@ class PackFlow:
         holding, pair = np.bincount(group, fines, count) > 0, group[self.network.throat_pores]
         pair = np.where(holding[pair], pair, pair[:, ::-1])
         on_fines *= holding[pair][..., None]
+        if finer is not None:
+            own = np.bincount(group, fines * self.network.pore_share, count)
+            on_fines *= ratio(own, own + finer)[pair][..., None]
         groups = _summed(pair.ravel(), on_fines.reshape(-1, 3), count)
         everything = drop @ self.facet_area
         return Pressed(frozen(everything - groups.sum(axis=0)), frozen(groups))
@@ -265,6 +274,11 @@ def pore_through(network: Network, flow: Flow) -> Array:
     return (np.maximum(into, out) / flow.inflow)[group]
 
 
+Finer = Callable[[Array, Array], Narrowed]
+"""What they do, from the shares (T, 2) that the spheres leave to the sides, and the volumes (P,)
+m3 of the spheres in the pores."""
+
+
 @dataclass(slots=True, eq=False)
 class Renewal:
     """What a damaged pack carries: its deposit followed, its network solved when enough changed.
@@ -287,11 +301,14 @@ class Renewal:
     carried: Carried | None = None
     solves: int = 0
 
-    def of(self, fines: Snapshot, *, anew: bool) -> tuple[Carried, KeptDeposit]:
+    def of(
+        self, fines: Snapshot, *, anew: bool, finer: Finer | None = None
+    ) -> tuple[Carried, KeptDeposit]:
         """What the pores carry with standing `fines`, which are `placed`.
 
         The network is solved when enough of them changed, and where `anew` asks. What a solve
-        gives does not depend on earlier ones, to the last digit.
+        gives does not depend on earlier ones, to the last digit. `finer` solids narrow what these
+        fines leave.
         """
         inside, pack = fines.where(reaching_inside(self.pack.network, fines)), self.pack
         if self.deposit is None:
@@ -300,8 +317,16 @@ class Renewal:
             self.deposit = self.deposit.changed_to(inside)
         if anew or self.carried is None or changed_share(self.solved, inside) > self.renewed:
             self.sections = pack.sections(inside, self.sections)
-            self.carried = pack.carried(self.sections.factor, self.deposit.in_pores)
-            self.solved, self.solves = inside, self.solves + 1
+            self.carried, self.solved = None, inside
+        assert self.sections is not None
+        kept = self.sections.factor
+        volume = None
+        if finer is not None:
+            kept, volume, grown = finer(kept, self.deposit.in_pores)
+            self.carried = None if grown else self.carried
+        if self.carried is None:
+            self.carried = pack.carried(kept, self.deposit.in_pores, volume)
+            self.solves += 1
         return self.carried, self.deposit
 
 

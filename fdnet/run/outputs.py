@@ -1,8 +1,8 @@
 """What a run writes next to its summary: tables, figures, ParaView files."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import accumulate
 from pathlib import Path
@@ -56,6 +56,8 @@ class Results:
         sizes: of grains and fines with measured curves.
         cleaned: what the clean-up gave; None without one.
         added: results that only some runs have.
+        numbers: of the summary, that only size classes give.
+        finer: fines of classes beside the spheres of LIGGGHTS; None without any.
     """
 
     path: Path
@@ -65,17 +67,22 @@ class Results:
     sizes: tuple[PlacedSizes, ...] = ()
     cleaned: Returned | None = None
     added: tuple[Added, ...] = ()
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    finer: Snapshot | None = None
 
     @property
     def shown(self) -> Snapshot:
         """The specimen at the end: damaged, or the intact grains."""
-        return self.grains if self.invasion is None else self.invasion.damaged
+        end = self.grains if self.invasion is None else self.invasion.damaged
+        return end if self.finer is None else end.joined(self.finer)
 
     @property
     def history_rows(self) -> list[dict[str, float]]:
         """The rows of history.csv; none without an invasion."""
         one = self.invasion
-        return [] if one is None else history_rows(one.case, one.scales, one.history, one.updates)
+        if one is None or one.rows:
+            return [] if one is None else list(one.rows)
+        return history_rows(one.case, one.scales, one.history, one.updates)
 
 
 def write_tables(results: Results) -> None:
@@ -114,7 +121,7 @@ def write_paraview(results: Results) -> list[str]:
     vtk.write_pvd(
         path / "spheres.pvd", [(0.0, "spheres_initial.vtp"), (shown.time_s, "spheres_damaged.vtp")]
     )
-    if one is not None:
+    if one is not None and not one.rows:
         (path / "frames").mkdir(exist_ok=True)
         stride, entries = -(-len(one.history) // MOST_FRAMES), []
         chosen = one.history[::-1][::stride][::-1]
@@ -247,10 +254,12 @@ _CAKE_COLUMNS = (
 def with_added(results: Results, record: dict[str, Any] | None) -> Results:
     """The results with what only some runs have; `record` is that of the clean-up, if any."""
     one, added = results.invasion, []
-    if one is not None:
+    if one is not None and one.rows:
+        added = [*_filtrate(one)]
+    elif one is not None:
         added = [_cake(results, one), *_filtrate(one)]
-        if results.analysis.invaded_count:
-            added.append(_bridging(results, one))
+    if one is not None and results.analysis.invaded_count:
+        added.append(_bridging(results, one))
     if results.cleaned is not None and record is not None:
         added.append(_clean_up(results, results.cleaned, record))
     return replace(results, added=tuple(added))
@@ -261,7 +270,7 @@ def _cake(results: Results, one: FinishedInvasion) -> Added:
     case, analysis = one.case, results.analysis
     cake = measure_cake(one.damaged, case.periodic)
     pack = case.size_m[0] / analysis.k_damaged if analysis.k_damaged > 0 else np.inf
-    summary = cake_summary(cake, pack)
+    summary = cake_summary(cake, pack, results.numbers.get("cake_of_classes_1_m", 0.0))
     if cake is None:
         return Added(name="cake", summary=summary)
     rows = cake_rows(cake)
@@ -284,12 +293,13 @@ def _cake(results: Results, one: FinishedInvasion) -> Added:
 
 def _filtrate(one: FinishedInvasion) -> Iterator[Added]:
     """Filtrate against the root of time, where the flow follows the deposit."""
-    if not one.updates or "filtrate_m3" not in one.updates[-1]:
+    updates, pace = one.rows or one.updates, 1.0 if one.rows else one.scales.force_factor
+    if not updates or "filtrate_m3" not in updates[-1]:
         return
     area = one.case.size_m[1] * one.case.size_m[2]
-    time = one.scales.force_factor * np.array([row["time_s"] for row in one.updates])
-    volume = np.array([row["filtrate_m3"] for row in one.updates]) / area
-    fit = fit_filtration(time, volume, cake_share(one.updates) or 0.0)
+    time = pace * np.array([row["time_s"] for row in updates])
+    volume = np.array([row["filtrate_m3"] for row in updates]) / area
+    fit = fit_filtration(time, volume, cake_share(updates) or 0.0)
     if fit is None:
         return
     usable = not fit.unsupported

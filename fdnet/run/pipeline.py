@@ -21,6 +21,14 @@ from fdnet.network.warm_up import compiling
 from fdnet.report import html, tables
 from fdnet.report.text import case_words, thesis_law_warning
 from fdnet.run.answer import with_answer
+from fdnet.run.by_classes import (
+    analysed_classes,
+    class_model,
+    class_summary,
+    finished_classes,
+    read_classes,
+    spheres_at_the_end,
+)
 from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
 from fdnet.run.dem_stages import (
     file_warnings,
@@ -35,8 +43,10 @@ from fdnet.run.folder import (
     MESHES,
     RECORDS,
     SOME_TABLES,
+    START_OVER,
     TABLES,
     RunFolder,
+    check_files,
     check_finished,
     digests_of,
     frames_in,
@@ -55,6 +65,7 @@ from fdnet.run.records import (
     RunOptions,
     Session,
     cores,
+    finer_file,
     record_warnings,
     stage_costs,
     stage_seconds,
@@ -65,7 +76,13 @@ from fdnet.run.summary import summarise
 from fdnet.scales.check import every_finding
 from fdnet.scales.cost import over_limit
 from fdnet.scales.pack import grain_count, refuse_unreachable
-from fdnet.scales.scales import InvasionScales, Scales, back_flow, scales_of
+from fdnet.scales.scales import (
+    InvasionScales,
+    Scales,
+    back_flow,
+    invasion_scales,
+    scales_of,
+)
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Directions, Snapshot
 
@@ -101,7 +118,9 @@ def run_case(
         progress: whether to show the progress on the terminal.
 
     Returns:
-        The finished run, as `open_run` gives it; lengths in m, permeabilities in m2.
+        The finished run, as `open_run` gives it; lengths in m, permeabilities in m2. With `resume`
+        and without the stage "invade", an invasion that was cut is analysed as far as it is: the
+        `stop_reason` of this provisional run is "unfinished".
 
     Raises:
         CaseError: the case, `out` or `stages` cannot be used.
@@ -131,8 +150,10 @@ def run_case(
         show_progress=progress,
         command="fdnet.run_case",
     )
-    run_stages(given, options)
-    return open_run(options.out)
+    if run_stages(given, options).get("stop_reason") != "unfinished":
+        return open_run(options.out)
+    files = digests_of(options.out, [*TABLES, *SOME_TABLES, *MESHES])
+    return FinishedRun(path=options.out, case=given, manifest={"files": files, "invade": {}})
 
 
 def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
@@ -207,12 +228,15 @@ def refusals(
             "grains.count or enlarge the box"
         )
     yield from _refused(refuse_unreachable, case)
-    if text := over_limit(case, scales, pack="pack" in needed, invade="invade" in needed):
+    spheres = not (isinstance(case, InvasionCase) and case.by_classes)
+    if text := over_limit(
+        case, scales, pack="pack" in needed, invade="invade" in needed and spheres
+    ):
         yield text
     if isinstance(case, InvasionCase) and isinstance(scales, InvasionScales):
         if "clean_up" in case.stages:
             yield from _refused(back_flow, case)
-        if "invade" in needed and supply:
+        if "invade" in needed and supply and spheres:
             yield from _refused(refuse_crowded_supply, case, scales)
 
 
@@ -315,6 +339,8 @@ def _analysed(session: Session, record: dict[str, Any] | None, *, returns: bool)
 
     case, grains = session.case, packed_grains(session)
     invasion = None
+    if record is not None and isinstance(case, InvasionCase) and case.by_classes:
+        return _analysed_classes(session, case, grains, record)
     if record is not None and isinstance(case, InvasionCase):
         invasion = invaded(session, case, grains, record)
     damaged = None if invasion is None else invasion.damaged
@@ -325,7 +351,7 @@ def _analysed(session: Session, record: dict[str, Any] | None, *, returns: bool)
         options = case.analysis.changed(damage_law=first.damage_law_used)
         again = analyse(grains, state, periodic=case.periodic, options=options)
         after = compared(damaged, state, again)
-    return Results(
+    results = Results(
         path=session.path,
         grains=grains,
         invasion=invasion,
@@ -333,6 +359,50 @@ def _analysed(session: Session, record: dict[str, Any] | None, *, returns: bool)
         sizes=tuple(placed_sizes(case, grains, damaged, record["supplied"] if record else 0)),
         cleaned=after,
     )
+    finer = record is not None and finer_file(record["steps"]) in record["files"]
+    return with_finer(results, record["supplied"]) if record and finer else results
+
+
+def _analysed_classes(
+    session: Session, case: InvasionCase, grains: Snapshot, record: dict[str, Any]
+) -> Results:
+    """The specimen after the fast model."""
+    from fdnet.network.permeability import analyse
+
+    folder = session.path / "invade"
+    check_files(folder, record, START_OVER)
+    done, model, kept = finished_classes(case, invasion_scales(case), grains, folder)
+    clean = analyse(grains, periodic=case.periodic, options=case.analysis)
+    return Results(
+        path=session.path,
+        grains=grains,
+        invasion=done,
+        analysis=analysed_classes(model, kept, clean, done.damaged),
+        sizes=tuple(placed_sizes(case, grains, None, 0)),
+        numbers=class_summary(case, model, kept),
+    )
+
+
+def with_finer(results: Results, supplied: int) -> Results:
+    """The results with the classes that are finer than the spheres, of which `supplied` came.
+
+    Counts are of spheres and of rows of fines, each of which stands for a mean sphere's volume.
+    """
+    one, grains = results.invasion, results.grains
+    assert one is not None
+    case, last = one.case, one.history[-1]
+    model = class_model(case, one.scales, grains)
+    kept = read_classes(results.path / "invade" / finer_file(last.step), one.updates[-1])
+    counts = model.counted(kept.by_class[-1])
+    fines = spheres_at_the_end(case, model, kept, counts)
+    numbers = class_summary(case, model, kept) | {
+        "supplied_count": supplied + int(counts.supplied.sum()),
+        "passed_count": last.passed + int(counts.passed.sum()),
+        "upstream_count": last.upstream + int(counts.upstream.sum()),
+    }
+    everyone = one.damaged.joined(fines)
+    analysis = analysed_classes(model, kept, results.analysis, everyone)
+    return replace(results, analysis=analysis, finer=fines, numbers=numbers)
 
 
 def with_default_laws(
@@ -378,6 +448,7 @@ def _summary(
             *file_warnings(session),
         ],
     )
+    summary |= results.numbers
     for one in results.added:
         summary |= one.summary
     return with_answer(summary, case, results.analysis, results.shown)

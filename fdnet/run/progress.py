@@ -27,19 +27,21 @@ part of it that is left; and steps that are expected beyond the forecast, over t
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forecast:
-    """What is known of a stage before it, in steps.
+    """What is known of a stage before it, in steps of its first length.
 
     Attributes:
         expected: at which it is expected to end.
         plug: without a crossing of the face, after which it ends; 0 without such a rule.
         cap: at which it ends at the latest; None without such a step.
         allowed: crossings a step that the rule lets pass.
+        chunk: steps of a chunk, where later chunks may take more; 0 where all steps are alike.
     """
 
     expected: int
     plug: int = 0
     cap: int | None = None
     allowed: float = 0.0
+    chunk: int = 0
 
     def end(self, seen: Sequence[tuple[int, int]]) -> int:
         """The step at which it ends, never one that is past.
@@ -91,7 +93,8 @@ class Progress:
     The forecast is one, or the expected number of steps.
 
     The time left goes by the speed of the last third of the steps, because fines that come make
-    steps slower. The bar is never full before the stage has ended.
+    steps slower. The bar is never full before the stage has ended. Chunks take one time: where one
+    took more steps than the first, it counts as the first, and so do steps of its length.
     """
 
     def __init__(self, stage: str, forecast: Forecast | int, *, show: bool = True) -> None:
@@ -101,6 +104,7 @@ class Progress:
         self.crossed: list[tuple[int, int]] = []
         self.clock: list[tuple[int, float]] = []
         self.step, self.note = 0, ""
+        self.begun, self.done, self.finer = 0, 0, 1.0  # of the chunk; steps, also of first length
         self._draw: Callable[[], None] = self._line
         self._stop: Callable[[], None] = lambda: None
 
@@ -134,9 +138,14 @@ class Progress:
     def __call__(self, line: str) -> None:
         """Take one line of the screen."""
         if line.startswith("FDNET checkpoint"):
-            step, upstream, invaded, passed = line.split()[3:7]
+            chunk, step, upstream, invaded, passed = line.split()[2:7]
             self.note = f"upstream {upstream}, invaded {invaded}, passed {passed}"
-            self.crossed.append((int(step), int(invaded) + int(passed)))
+            each = self.forecast.chunk
+            done = int(chunk) * each or int(step)
+            if each and done == self.done + each:
+                self.finer = (int(step) - self.begun) / each
+            self.begun, self.done = int(step), done
+            self.crossed.append((done, int(invaded) + int(passed)))
             self._at(int(step))
         elif line.startswith("FDNET"):
             name, *numbers = line.split()[1:] or [""]
@@ -147,10 +156,16 @@ class Progress:
             self._at(int(match.group(1)))
 
     @property
+    def even(self) -> int:
+        """The step in steps of the first length."""
+        return self.done + round((self.step - self.begun) / self.finer)
+
+    @property
     def end(self) -> int:
-        """The step at which the stage is expected to end, as far as is known now."""
+        """The step at which the stage is expected to end, with steps as long as now."""
         last = self.crossed[-1][1] if self.crossed else 0
-        return self.forecast.end([*self.crossed, (self.step, last)])
+        end = self.forecast.end([*self.crossed, (self.even, last)])
+        return self.step + round((end - self.even) * self.finer)
 
     def _at(self, step: int) -> None:
         if step < self.step:  # another attempt at a pack counts from zero

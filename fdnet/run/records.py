@@ -40,7 +40,7 @@ from fdnet.run.folder import (
     read_record,
 )
 from fdnet.run.progress import Progress
-from fdnet.scales.scales import InvasionScales, Scales
+from fdnet.scales.scales import InvasionScales, Scales, invasion_scales
 from fdnet.spheres.geometry import overlap_doubts
 from fdnet.spheres.snapshot import Snapshot
 
@@ -77,9 +77,12 @@ def pack_record(
     }
 
 
-def invade_record(case: Case, result: Invasion, folder: Path, *, seconds: float) -> dict[str, Any]:
+def invade_record(
+    case: InvasionCase, result: Invasion, folder: Path, *, seconds: float
+) -> dict[str, Any]:
     """invade/stage.json: how the invasion in `folder` ended."""
-    dumps = (f"post/invade_{row.step}.dump" for row in result.history)
+    dumps = [f"post/invade_{row.step}.dump" for row in result.history]
+    finer = finer_file(result.history[-1].step)
     return {
         "format": RECORD_FORMAT,
         "digest": case.digest("invade"),
@@ -89,14 +92,23 @@ def invade_record(case: Case, result: Invasion, folder: Path, *, seconds: float)
         "max_overlap_step": result.overlap.step,
         "steps": result.history[-1].step,
         "dt_s": result.step_s,
+        "springs": {
+            "dem_dt_last_s": result.last.time_step,
+            "stiffness_N_m": [invasion_scales(case).stiffness, result.last.stiffness],
+        },
         "supplied": result.supplied,
         "warnings": [explained(one) for one in result.warnings],
         "ranks": result.ranks,
         **_updates(result.updates),
-        "files": digests_of(folder, [HISTORY, WATCH, UPDATES, *dumps]),
+        "files": digests_of(folder, [HISTORY, WATCH, UPDATES, finer, *dumps]),
         "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out],
     }
+
+
+def finer_file(step: int) -> str:
+    """Where an invasion of spheres and finer classes keeps the classes at a checkpoint."""
+    return f"post/invade_{step}.npz"
 
 
 def _updates(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
@@ -172,7 +184,9 @@ def record_warnings(
     step = invasion.get("max_overlap_step", invasion["steps"])
     deepest = Deepest(step=step, fraction=invasion["max_overlap"])
     if deepest.fraction > case.run.max_overlap:
-        yield Doubt("overlap", f"{overlap_text(case, deepest)}: raise run.stiffness_N_m")
+        assert isinstance(case, InvasionCase)
+        springs = invasion.get("springs", {"stiffness_N_m": [invasion_scales(case).stiffness]})
+        yield Doubt("overlap", overlap_text(case, deepest, springs["stiffness_N_m"][-1]))
     updates = invasion.get("updates", {})
     if updates.get("momentum_open"):
         yield Doubt(
@@ -260,6 +274,7 @@ class FinishedInvasion:
         history: one row a checkpoint.
         damaged: grains and all remaining fines at the end.
         updates: the record of a coupled invasion, one row an update; empty of others.
+        rows: of history.csv, where the fast model made it; empty of others.
     """
 
     case: InvasionCase
@@ -267,6 +282,7 @@ class FinishedInvasion:
     history: tuple[Checkpoint, ...]
     damaged: Snapshot
     updates: tuple[Mapping[str, float], ...] = ()
+    rows: tuple[dict[str, float], ...] = ()
 
 
 # ------------------------------------------------------------------------------------------------
@@ -286,7 +302,7 @@ class RunOptions:
         liggghts: path of the binary; None: looked for.
         launcher: template that starts several ranks, as "srun -n {ranks}"; None: mpirun.
         pack_from: run folder whose finished pack is taken; None: the pack is made.
-        timeout: s, after which LIGGGHTS is stopped; None: never.
+        timeout: s, after which LIGGGHTS is stopped in each stage; None: never.
         show_progress: whether to write progress to standard error.
         command: command line that started the run, for its records.
         answered: takes the summary when the analysis is done, before the pictures are drawn.
@@ -360,14 +376,14 @@ class Session:
         return stage in self.options.stages and stage in self.case.stages
 
     def launch(self, progress: Progress) -> Launch:
-        """How this run starts LIGGGHTS; the binary is looked for when a stage first needs it."""
+        """How a stage that begins now starts LIGGGHTS, within its time limit."""
+        options = self.options
         if self._binary is None:
-            options = self.options
             self._binary = find_binary(options.liggghts, launcher=options.launcher)
         return Launch(
             binary=self._binary,
-            ranks=self.options.ranks,
-            timeout=self.options.timeout,
+            ranks=options.ranks,
+            deadline=options.timeout and time.monotonic() + options.timeout,
             follow=progress,
         )
 

@@ -82,6 +82,7 @@ def summarise(
         "ranks": {"pack": pack["ranks"], "invade": invasion["ranks"] if invasion else None},
         "dem_steps": pack["steps"] + (invasion["steps"] if invasion else 0),
         "dem_dt_s": (invasion or pack)["dt_s"],
+        **(invasion or {}).get("springs", {}),
         "physical_time_s": physical_time_s,
         "seconds": seconds
         | {f"analyse_{name}": value for name, value in analysis.seconds.items()},

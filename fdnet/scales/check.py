@@ -82,6 +82,8 @@ def width_error(width: float, *, periodic: bool) -> float:
 
 MOST_WIDTH_ERROR = 0.10
 """Error of the permeability by the width of the specimen, from which it is named."""
+LEAST_LENGTH = 3.0
+"""Length over the mean grain, below which it is named."""
 ABSURD = 10.0
 """Velocity over that at a usual well, from which it is named; the square of it where the case
 gives the velocity or a plug."""
@@ -110,6 +112,15 @@ def findings(case: Case, scales: Scales) -> Iterator[Finding]:
             do=f"take {sides}a width of {1e3 * wider * mean:.2g} mm for less than "
             f"{100 * MOST_WIDTH_ERROR:.0f} %, or use the ratio only",
             read="docs/evidence/error_against_time.md",
+        )
+    length = case.size_m[0] / mean
+    if isinstance(case, InvasionCase) and length < LEAST_LENGTH * WHOLE_GRAIN:
+        yield Finding(
+            key="box.size_mm",
+            what=f"the specimen is {length:.2g} mean grains long ({1e3 * case.size_m[0]:.3g} mm)",
+            follows="the damage may reach its end, and then there is no depth and no skin",
+            do=f"take a length of {8e3 * mean:.2g} mm, 8 grains, or more",
+            read="docs/how-to/your_sand_and_your_mud.md",
         )
     diameter, count = 2 * case.grains.mean_radius_m, case.analysis.sections
     assert isinstance(count, int)
@@ -180,7 +191,7 @@ def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Fin
             read="docs/how-to/your_sand_and_your_mud.md",
         )
     # the finest tenth of the solids makes most of the time
-    if not fines.measured or curve.low == curve.high:
+    if not fines.measured or curve.low == curve.high or case.by_classes:
         return
     cut = float(f"{1e6 * curve.size_at(FINE_SHARE):.2g}")
     data = case.data()

@@ -43,7 +43,7 @@ bridge end after two volumes of the pores, and no mud has more fines than the la
 
 def supplied_solids(case: InvasionCase, slab: float) -> float:
     """Fines of a slab of `slab` m a unit of face, over the median diameter of the grains."""
-    return slab * case.fines.placed_fraction / case.grains.curve.size_at(0.5)
+    return slab * case.solids_fraction / case.grains.curve.size_at(0.5)
 
 
 def present_share(case: InvasionCase, *, duration: float, feeding: float) -> float:
@@ -125,7 +125,7 @@ def slab_of(case: InvasionCase, throat_ratio: float) -> Slab:
 def _most_mud(case: InvasionCase, throat_ratio: float) -> Slab:
     """The slab of mud that comes until the stop rule; its last fine is that of the bound."""
     share, area = case.fines.placed_fraction, case.size_m[1] * case.size_m[2]
-    length = MUD_SOLIDS * case.grains.curve.size_at(0.5) / share
+    length = MUD_SOLIDS * case.grains.curve.size_at(0.5) / case.solids_fraction
     if throat_ratio < BRIDGING:
         length = min(length, MUD_PORES * target_porosity(case) * case.size_m[0])
     per_length = share * area / case.fines.mean_volume_m3
@@ -384,7 +384,7 @@ def drive_in(case: InvasionCase, velocity: Velocity) -> Drive:
     own = push_of(case, velocity.interstitial, velocity.pressure_gradient)
     free = own.velocity + own.drift(case.fines.radius_range_m[1])
     time = relaxation_times(case)[1]
-    if case.drag.field == "network":
+    if case.drag.coupled:
         mud = 1 - case.fines.placed_fraction
         time /= float(crowd_drag_factor(Crowd(porosity=mud))) / mud
     return drive_of(case, own.velocity, time, free)
@@ -436,7 +436,7 @@ def deposit_pressure(case: InvasionCase, flow: Velocity, porosity: float) -> flo
 def rises(case: Case) -> bool:
     """Whether the springs of an invasion are stiffened when the deposit asks for it."""
     auto = case.run.stiffness_N_m == "auto" and case.run.time_step_s is None
-    return isinstance(case, InvasionCase) and case.drag.field == "network" and auto
+    return isinstance(case, InvasionCase) and case.drag.coupled and auto
 
 
 def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
@@ -468,7 +468,7 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
     deep = overlaps_of(soft, contact, flow, drive_in(soft, flow), porosity, borne)
     held, struck = (1.5, 2.5) if soft.contact.model == "hertz" else (1.0, 2.0)
     raised = max(
-        0.0 if soft.drag.field == "network" else 1.0,
+        0.0 if soft.drag.coupled else 1.0,
         (deep.drag / PRESSED) ** held,
         (deep.deposit / PRESSED) ** held * (STARTING if start and rises(case) else 1.0),
         (deep.impact / PRESSED) ** struck,

@@ -336,7 +336,7 @@ def _damping_and_stokes(
 def least_restitution(case: Case) -> float:
     """Restitution below which the liquid lowers nothing further."""
     least = LEAST[case.contact.model]
-    followed = isinstance(case, InvasionCase) and case.drag.field == "network"
+    followed = isinstance(case, InvasionCase) and case.drag.coupled
     longer = (case.run.time_step_factor or SAFE_FACTOR) > SAFE_FACTOR
     return max(least, LEFT) if followed and longer and case.contact.model == "hooke" else least
 
@@ -418,7 +418,7 @@ def overlaps_of(
     """
     push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
     deposit = 0.0
-    if case.drag.field == "network":
+    if case.drag.coupled:
         throat = throat_width(porosity, flow.permeability)
         deposit = LARGEST_CHAIN * drive.factor * pressure * math.pi / 4.0 * throat**2
     radius, mass = case.fines.radius_range_m[1], mass_range(case.fines)[1]

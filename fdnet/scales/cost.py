@@ -34,6 +34,9 @@ cache."""
 UPDATE_SECONDS = (0.03, 9.0e-5)
 """Seconds of one update of the flow that follows the deposit: at least, and for each grain and
 fine."""
+BESIDE_CLASSES = (5, 2)
+"""Steps beside finer classes over those without, because springs are stiffened for what presses
+the spheres, and seconds of updates over those without."""
 FALLING_RATE = 0.6
 """Mean rate over the first, where the deposit slows the flow."""
 WAITING, TRICKLING = 2.0, 1.4
@@ -44,6 +47,9 @@ START_SECONDS, REPORT_SECONDS, SPHERE_SECONDS = 3.0, 8.0, 6.0e-4
 BYTES_PER_SPHERE = 600
 REPORT_BYTES, NETWORK_BYTES = 6.0e8, 8.0e3
 """Memory of the report, and of the network for each of up to `MOST_SPHERES` spheres."""
+
+CLASS_SECONDS = 7e-3
+"""s for each grain of the fast model, whose steps solve the flow some hundred times."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,6 +85,9 @@ def cost_of(case: Case, scales: Scales) -> Cost:
     python = START_SECONDS + REPORT_SECONDS
     if not isinstance(case, InvasionCase) or not isinstance(scales, InvasionScales):
         return Cost(pack_seconds=pack, analyse_seconds=python + grains * SPHERE_SECONDS)
+    if case.by_classes:
+        fast, known = grains * CLASS_SECONDS, python + grains * SPHERE_SECONDS
+        return Cost(pack_seconds=pack, invade_seconds=fast, analyse_seconds=known)
     duration, drag = expected_duration(case, scales), case.drag
     steps = math.ceil(duration / scales.time_step)
     feeding = scales.slab_length / scales.upstream_velocity
@@ -91,6 +100,9 @@ def cost_of(case: Case, scales: Scales) -> Cost:
         updates = count * (least + each * (grains + fines))
     grain = MOVING_GRAIN_SECONDS if case.grains.motion == "mobile" else FIXED_GRAIN_SECONDS
     fine = FINE_SECONDS[drag.scheme] * (1 + fines / (fines + CACHED_FINES))
+    if case.with_classes:
+        more, again = BESIDE_CLASSES
+        steps, updates = more * steps, again * updates
     return Cost(
         pack_seconds=pack,
         invade_seconds=steps * (STEP_SECONDS + grains * grain + fines * fine) + updates,
@@ -115,7 +127,7 @@ def expected_duration(case: InvasionCase, scales: InvasionScales) -> float:
     if scales.throat_ratio < BRIDGING:
         share = 1.0
         feeding += case.size_m[0] / scales.drive_velocity
-    slower = 1 / FALLING_RATE if case.drag.field == "network" else 1.0
+    slower = 1 / FALLING_RATE if case.drag.coupled else 1.0
     trickle = 0.0 if case.run.plug_rate > 0 else TRICKLING
     watched = max(WAITING * scales.plug_time, trickle * case.size_m[0] / scales.drive_velocity)
     return min(scales.cap_time, slower * feeding * min(1.0, share) + watched)
@@ -165,8 +177,7 @@ def over_limit(case: Case, scales: Scales, *, pack: bool = True, invade: bool = 
     elif scales.time_step < 0.999 * sound:
         reason, remedy = "a tenth of the drag relaxation time", "take drag.scheme = 'implicit'"
     else:
-        stiffness = max(contact.normal_stiffness for contact in scales.contacts.values())
-        reason = f"set by contacts of {stiffness:.3g} N/m"
+        reason = f"set by contacts of {scales.stiffness:.3g} N/m"
         remedy = "lower run.stiffness_N_m (the time goes with its square root)"
     return (
         f"{refusal}: {cost.steps:.3g} steps of {scales.time_step:.3g} s ({reason}) with "

@@ -56,6 +56,8 @@ def filled(given: Answers, ask: Callable[[Question, str], str | None] | None) ->
                 ask = None
                 break
             text, problem = question.read(reply or question.default or "")
+            if not text and question.default is None:
+                problem = f"it needs an answer, as {question.example}"
             if not reply and question.default is not None:
                 break
         answers[question.key] = text or question.default or ""
@@ -128,8 +130,9 @@ class Choice:
         width: m. length: m. sections: their number.
         sand_cut: percent of the sand left out at the fine end.
         mud_cut: percent of the solids below the coarse cut.
-        cut: m, diameter below which solids are left out; 0 for none.
+        cut: m, diameter from which solids are spheres in LIGGGHTS; 0 where all are.
         passing: m, diameter up to which solids pass the throats.
+        method: of the invasion, as the case names it.
     """
 
     width: float
@@ -139,6 +142,7 @@ class Choice:
     mud_cut: float
     cut: float
     passing: float = 0.0
+    method: str = "liggghts"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -190,6 +194,7 @@ def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
             **({} if outer == usual["drainage_radius"] else {"drainage_radius": outer}),
             **({"formation_permeability": known} if known else {}),
         },
+        "invasion": {"method": choice.method} if choice.method != "liggghts" else {},
         "analysis": {"sections": choice.sections},
     }
 
@@ -212,10 +217,8 @@ SECTION = 2.0
 """Thickness of a section in mean grain diameters."""
 SAND_CUTS = (1.0, 2.0, 5.0, 10.0)
 """Shares of the finest sand, percent, that may be left out to clear the coarsest mud."""
-LEAST_KEPT = 0.5
-"""Share of the solids that must stay when the finest are left out."""
-LEAST_LEFT = 0.05
-"""Share of the solids above a seventh of a throat from which the finer ones are left out."""
+LEAST_SPHERES = 0.05
+"""Share of the solids that spheres must be at least: for fewer the network takes all."""
 FINEST_OF_THROAT = 1 / 7
 """Fines below this part of the throats pass (Barkman and Davidson 1972, J. Pet. Tech. 24)."""
 GAP = 0.95
@@ -245,17 +248,17 @@ def designed(
 ) -> Design:
     """The case of the answers within a budget; `folder` is where files of sizes are looked for.
 
-    The width and length follow from the grains, the supply from what plugs the face. Then the
-    finest solids are left out as far as the budget asks, and only then is the supply shortened.
-    A choice that makes no case, or one for which `fdnet run` has `refusals`, does not fit.
+    The width and length follow from the grains, the supply from what plugs the face. LIGGGHTS
+    takes the solids down to the finest that the budget allows, the network what is finer; where
+    even the coarsest take too long, it takes all. A choice that makes no case, or one for which
+    `fdnet run` has `refusals`, does not fit.
 
     Raises:
         CaseError: the answers make no case; it says which, by their options.
     """
     sand, mud = _sizes(answers, folder)
     first = _first_choice(answers, budget, sand, mud)
-    solids = _mud_curve(mud, first.mud_cut)
-    choices = list(_candidates(first, solids))
+    choices = list(_candidates(first, _mud_curve(mud, first.mud_cut)))
     low, high, why = 0, len(choices) - 1, ""
     while low < high:
         middle = (low + high) // 2
@@ -272,28 +275,9 @@ def designed(
             why = str(error)
         if not why:
             return design
-    raise CaseError(_no_specimen(why, solids, choices[0]))
-
-
-def _no_specimen(why: str, solids: SizeCurve, first: Choice) -> str:
-    """That no choice makes a case that is run, with the reason and the options to change."""
     reason = re.split(r"; |: (?=take|lower|raise)", _spoken(why))[0]
-    if reason.startswith("--"):
-        return f"{reason}: change it"
-    key, _, words = reason.partition(": ")
-    subject = {"run.max_hours": "at most ", "run.time_step_s": "a time step of "}.get(key, "")
-    passing = ""
-    if _kept_above(solids, first.passing) < LEAST_KEPT * solids.kept:
-        passing = (
-            f" (most of the solids, {um(solids.low)} to {um(solids.high)}, are finer than a "
-            f"seventh of a throat, {um(first.passing)}, and pass)"
-        )
-    return (
-        "no specimen of this sand and mud can be run, with as much of the finest "
-        f"solids and of the mud left out as may be{passing}: {subject}{words}; give coarser or "
-        "fewer solids (--mud-d10, --mud-d50, --mud-d90, --solids), a finer sand (--sand-d10, "
-        "--sand-d50, --sand-d90), or another flow (--overbalance, --viscosity)"
-    )
+    what = "" if reason.startswith("--") else "no specimen of this sand and mud can be run: "
+    raise CaseError(f"{what}{reason}; change it, or take --size quick")
 
 
 def _sizes(answers: Answers, folder: Path) -> tuple[Sizes, Sizes]:
@@ -371,17 +355,13 @@ def _clear_cuts(sand: Sizes, mud: Sizes) -> tuple[float, float]:
 
 
 def _candidates(first: Choice, curve: SizeCurve) -> Iterator[Choice]:
-    """From all solids that matter to half of them.
-
-    Solids that pass are left out, unless hardly any others are there.
-    """
-    passing = first.passing if _kept_above(curve, first.passing) >= LEAST_LEFT else 0.0
-    finest = max(curve.low, passing)
-    choice = replace(first, cut=finest if finest > curve.low else 0.0)
-    yield choice
-    while _kept_above(curve, finest := 1.1 * finest) >= LEAST_KEPT:
-        choice = replace(first, cut=float(f"{finest:.2g}"))
-        yield choice
+    """From spheres down to what passes the throats to none; the network takes the others."""
+    finest = max(curve.low, first.passing)
+    while _kept_above(curve, finest) >= LEAST_SPHERES:
+        cut = float(f"{finest:.2g}") if finest > curve.low else 0.0
+        yield replace(first, cut=cut, method="both" if cut else "liggghts")
+        finest *= 1.1
+    yield replace(first, method="network")
 
 
 def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> Design:
@@ -443,7 +423,7 @@ def _value(value: Any) -> str:
         return "{ " + ", ".join(f"{key} = {_value(one)}" for key, one in value.items()) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(_value(one) for one in value) + "]"
-    return json.dumps(value)
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _comment(text: str) -> list[str]:
@@ -452,9 +432,10 @@ def _comment(text: str) -> list[str]:
 
 def _top(design: Design) -> str:
     answers, curve = design.answers, design.case.fines.curve
-    median = um(curve.size_at((0.5 - curve.below) / curve.kept)) if curve.below < 0.5 else ""
+    half = "" if curve.below >= 0.5 else um(curve.size_at((0.5 - curve.below) / curve.kept))
+    half = half or answers.get("mud_d50", "")
     return (
-        f"A mud of {answers['solids']} solids (half of them below {median or 'the solids'}) at a "
+        f"A mud of {answers['solids']} solids{f' (half of them below {half})' * bool(half)} at a "
         f"sand of {answers['porosity']} porosity, {answers['overbalance']} over the formation. "
         f"Written by fdnet init, size {design.budget.name}: the run is expected to take "
         f"{spoken_time(design.seconds)} on one core. fdnet check looks at it, fdnet run runs it."
@@ -498,34 +479,38 @@ def _notes(design: Design) -> dict[str, str]:
             f" The coarsest {100 * case.fines.curve.above:.2g} % are left out: they are as large "
             "as the smallest grains and would only lie in the cake."
         )
+    fits = f"the run fits its time ({spoken_time(design.budget.seconds)} for the size "
+    fits += f"{design.budget.name})"
     if choice.cut:
-        notes["fines.cut"] = _cut_note(design, throat)
+        notes["fines.cut"] = (
+            "Coarser solids are spheres in LIGGGHTS, and "
+            f"{100 * case.fines.curve.below:.0f} % of the solids are finer: the pore network "
+            f"carries these as size classes in the same flow. So {fits}. Lower it when you can "
+            f"wait; below {um(FINEST_OF_THROAT * throat)}, a seventh of a throat, they pass."
+        )
+    if choice.method == "network":
+        notes["invasion.method"] = (
+            f"The pore network carries all solids as size classes. So {fits}; spheres in LIGGGHTS "
+            'would not: method = "both" moves those above fines.cut as spheres.'
+        )
     return notes
 
 
-def _cut_note(design: Design, throat: float) -> str:
-    curve = design.case.fines.curve
-    text = f"{100 * curve.below:.0f} % of the solids are finer than this and left out"
-    if curve.low <= 1.01 * FINEST_OF_THROAT * throat:
-        return f"{text}: below a seventh of a throat they pass."
-    return (
-        f"{text}, so that the run fits its time ({spoken_time(design.budget.seconds)} for the "
-        f"size {design.budget.name}). Those above a seventh of a throat "
-        f"({um(FINEST_OF_THROAT * throat)}) matter: lower it when you can wait longer."
-    )
-
-
-def left_out(design: Design) -> Iterator[str]:
-    """What of the sand and the mud is not in the case, and whether that was enough."""
+def taken(design: Design) -> Iterator[str]:
+    """What LIGGGHTS takes of the mud, what the network takes, and what neither does."""
     choice, curve = design.choice, design.case.fines.curve
     if choice.sand_cut > 1.0:
         yield f"left out: the finest {choice.sand_cut:g} % of the sand"
+    if choice.method == "network":
+        yield (
+            "the network takes all solids, as size classes: spheres in LIGGGHTS take longer than "
+            f"the {spoken_time(design.budget.seconds)} of --size {design.budget.name}, or are "
+            "hardly any"
+        )
+        return
+    yield f"LIGGGHTS takes {100 * curve.kept:.2g} % of the solids, as spheres from {um(curve.low)}"
     if curve.below > 0.0:
-        yield f"left out: {100 * curve.below:.2g} % of the solids, finer than {um(curve.low)}"
+        finer = "the network takes" if choice.method == "both" else "left out:"
+        yield f"{finer} {100 * curve.below:.2g} % of the solids, finer than {um(curve.low)}"
     if curve.above > 0.0:
         yield f"left out: {100 * curve.above:.2g} % of the solids, coarser than {um(curve.high)}"
-    if design.seconds > 1.05 * design.budget.seconds:
-        yield (
-            f"longer than the {spoken_time(design.budget.seconds)} of --size "
-            f"{design.budget.name}: no more can be left out; coarser or fewer solids are faster"
-        )

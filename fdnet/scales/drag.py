@@ -338,7 +338,7 @@ def throat_warnings(case: InvasionCase, ratio: float) -> list[Doubt]:
     `ratio` is the diameter of the largest fine over that of the throats. Where the flow follows
     the deposit a fine that stands feels the pressures of the network instead.
     """
-    if case.drag.field == "network":
+    if case.drag.coupled:
         return []
     text = (
         f"the largest fine ({2e3 * case.fines.radius_range_m[1]:.3g} mm) is {ratio:.2g} of the "

@@ -306,3 +306,34 @@ def drive_warnings(case: InvasionCase, drive: Drive) -> list[Doubt]:
         f"to matter: lower it to {lower:.2g} m/s"
     )
     return [Doubt("driven-inertia", text)]
+
+
+# ------------------------------------------------------------------------------------------------
+# The filter press of the API (RP 13I): 30 minutes at 100 psi through 45.8 cm2 of paper.
+#
+# The solids c of the mud make a cake of the porosity p and the thickness h = V c / (1 - p - c), V
+# being the filtrate per area. Darcy's law through it, V dV = k dp / mu (1 - p - c) / c dt, gives
+# V^2 = 2 k dp t (1 - p - c) / (mu c). The paper resists nothing, and there is no spurt.
+
+
+API_PRESSURE, API_TIME, API_AREA = 690e3, 1800.0, 45.8e-4
+"""Pa, s and m2."""
+
+
+def api_filtrate(
+    permeability: float, *, viscosity: float, solids: float, porosity: float
+) -> float:
+    """Filtrate, m3, of the API's press by a cake of this `permeability` m2 and `porosity`.
+
+    `viscosity` Pa s is that of the filtrate, `solids` the share of the mud by volume.
+    """
+    room = 2.0 * API_PRESSURE * API_TIME * (1.0 - porosity - solids) / (viscosity * solids)
+    return API_AREA * math.sqrt(permeability * room)
+
+
+def api_permeability(
+    filtrate: float, *, viscosity: float, solids: float, porosity: float
+) -> float:
+    """Permeability, m2, of the cake that lets `filtrate` m3 through the API's press."""
+    one = api_filtrate(1.0, viscosity=viscosity, solids=solids, porosity=porosity)
+    return (filtrate / one) ** 2

@@ -122,6 +122,7 @@ def diameter_at(curve: SizeCurve, share: float) -> float | None:
 
 def size_warnings(case: Case) -> Iterator[Doubt]:
     """What curves miss and what they leave out, and a sand denser than rigid spheres get."""
+    by_classes = isinstance(case, InvasionCase) and case.by_classes
     for name, spheres in curves_of(case).items():
         given = [] if spheres.sizes is None else [(f"{name}.sizes", spheres.sizes)]
         for number, one in enumerate(getattr(spheres, "materials", None) or ()):
@@ -138,13 +139,16 @@ def size_warnings(case: Case) -> Iterator[Doubt]:
                     "(size and passing, or a file) if it matters",
                 )
         curve = spheres.curve
-        ends = ((curve.below, "finer", curve.low), (curve.above, "coarser", curve.high))
+        below = curve.below
+        if isinstance(spheres, Fines) and isinstance(case, InvasionCase):
+            below *= not (case.with_classes or case.by_classes)
+        ends = ((below, "finer", curve.low), (curve.above, "coarser", curve.high))
         parts = [
             f"{100 * share:.3g} % of the solids ({side} than {1e6 * size:.3g} um)"
             for share, side, size in ends
             if share > MOST_TAIL
         ]
-        if parts:
+        if parts and not (isinstance(spheres, Fines) and by_classes):
             thinner = ""
             if isinstance(spheres, Fines):
                 whole, placed = spheres.volume_fraction, spheres.placed_fraction

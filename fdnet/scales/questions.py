@@ -50,7 +50,8 @@ class Question(NamedTuple):
             else:
                 converted(text, suffix)
         except ValueError as error:
-            return text, f"{self.option}: {text!r}: {error}"
+            plain = ", or a number below 1" if "%" in self.unit else ""
+            return text, f"{self.option}: {text!r}: {error}{plain}"
         return text, ""
 
 

@@ -128,6 +128,12 @@ class InvasionScales(Scales):
     deposit_overlap: float
     sticking: Sticking
 
+    @property
+    def stiffness(self) -> float:
+        """Of the stiffest contact, N/m, as `run.stiffness_N_m` has it."""
+        some = (one for one in self.contacts.values() if not one.elastic or "fine" in one.pair)
+        return max(one.normal_stiffness for one in some)
+
 
 def scales_of(case: Case) -> Scales:
     """All scales of a case; InvasionScales when it has fines.
@@ -230,19 +236,19 @@ def _invasion(
     displaced = fluid.density_kg_m3 * case.gravity.buoyancy
     excess = max(abs(one.density - displaced) for one in fines.components)
     weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
-    warnings = [
-        *shared.warnings,
-        *velocity_warnings(case, shared.porosity, flow),
-        *drive_warnings(case, drive),
-        *reynolds_warnings(case, push, reynolds, throat_ratio=throat),
-        *throat_warnings(case, throat),
-        *overlap_warnings(case, overlaps),
-        *cohesion_warnings(case, contact),
-        *slab_warnings(case, slab),
-        *drag_warnings(case, hold * step / shortest),
-        *plug_warnings(case, times.plug, drive, upstream),
-        *sticking_warnings(sticking),
-    ]
+    warnings = [*shared.warnings, *velocity_warnings(case, shared.porosity, flow)]
+    if not case.by_classes:
+        warnings += [
+            *drive_warnings(case, drive),
+            *reynolds_warnings(case, push, reynolds, throat_ratio=throat),
+            *throat_warnings(case, throat),
+            *overlap_warnings(case, overlaps),
+            *cohesion_warnings(case, contact),
+            *slab_warnings(case, slab),
+            *drag_warnings(case, hold * step / shortest),
+            *plug_warnings(case, times.plug, drive, upstream),
+            *sticking_warnings(sticking),
+        ]
     return InvasionScales(
         **{item.name: getattr(shared, item.name) for item in fields(shared)}
         | {"warnings": tuple(warnings)},

@@ -141,7 +141,7 @@ def _fine_rows(case: InvasionCase, scales: InvasionScales) -> Iterator[Quantity]
         yield row("throat_drag", held_factor(scales.throat_ratio))
     yield row(f"{case.contact.model}_impact", scales.impact_overlap)
     yield row(f"{case.contact.model}_drag", scales.drag_overlap)
-    if case.drag.field == "network":
+    if case.drag.coupled:
         yield row("deposit", scales.deposit_overlap, chain=LARGEST_CHAIN)
     endless = isinstance(case, InvasionCase) and case.fines.endless
     most = ", at most" if endless else ""

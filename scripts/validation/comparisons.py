@@ -59,7 +59,7 @@ class Finding(NamedTuple):
     @property
     def verdict(self) -> str:
         """In words."""
-        return self.note or ("agrees" if abs(self.over) <= 1 else "**disagrees**")
+        return self.note or ("holds" if abs(self.over) <= 1 else "**does not hold**")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +148,8 @@ def _by_lines(
 
 def read_rows(path: Path) -> pd.DataFrame:
     """The rows of the CSV; those of a value that is a number hold it as one."""
-    rows = pd.read_csv(path) if path.exists() else pd.DataFrame(columns=list(COLUMNS))
+    names = {"comparison": str}
+    rows = pd.read_csv(path, dtype=names) if path.exists() else pd.DataFrame(columns=list(COLUMNS))
     return rows.assign(value=[_value(text) for text in rows.value])
 
 
@@ -189,7 +190,7 @@ def measure(comparisons: Sequence[Comparison], path: Path, *, quick: bool) -> No
                     writer = csv.writer(file)
                     writer.writerows([COLUMNS] if file.tell() == 0 else [])
                     writer.writerows(
-                        [one.name, value, seed, name, repr(observed), core, status]
+                        [one.name, value, seed, name, repr(float(observed)), core, status]
                         for name, observed in seen.items()
                     )
                 print(f"{one.name} {value} {seed}: {seen} {status}", file=sys.stderr, flush=True)
@@ -220,8 +221,9 @@ def draw_differences(axes: Any, lines: Sequence[Finding]) -> None:
         colour = BLUE if abs(line.over) <= 1 else ORANGE
         marker = "o" if abs(line.over) < 6 else ">" if line.over > 0 else "<"
         axes.plot(min(6.0, max(-6.0, line.over)), place, marker, color=colour)
-    axes.set_yticks(range(len(shown)), [line.what for line in shown], fontsize=8)
-    axes.set(xlabel="difference over the allowed one (grey: agrees)")
+        axes.text(0.01, place + 0.2, line.what, transform=axes.get_yaxis_transform())
+    axes.set(yticks=[], ylim=(-0.7, len(shown) - 0.2))
+    axes.set(xlabel="difference over the allowed one (grey: holds)")
 
 
 def command(name: str, chapter: Chapter, arguments: Sequence[str]) -> int:
@@ -251,10 +253,11 @@ def command(name: str, chapter: Chapter, arguments: Sequence[str]) -> int:
     lines = findings(comparisons, rows)
     out.mkdir(parents=True, exist_ok=True)
     write_text(out / f"{name}.md", table(lines))
-    figure = Figure(figsize=(13.0, 5.5), layout="constrained", dpi=110)
-    left, right = figure.subplots(1, 2)
-    draw_differences(left, lines)
-    chapter.panel(right, rows)
+    heights = (0.36 * sum(not math.isnan(line.over) for line in lines) + 1.0, 4.0)
+    figure = Figure(figsize=(5.2, sum(heights)), layout="constrained", dpi=130)
+    above, below = figure.subplots(2, height_ratios=heights)
+    draw_differences(above, lines)
+    chapter.panel(below, rows)
     with replacing(out / f"{name}.png") as part:
         figure.savefig(part)
     print(table(lines))

@@ -2,7 +2,7 @@
 
     python scripts/validation.py mechanics [--quick] [--only NAME] [--out DIR] [--rows FILE.csv]
 
-The rows of all runs are in docs/validation/mechanics.csv, the answer in docs/evidence/outside.md.
+Rows of all runs: docs/validation/mechanics.csv. Answer: docs/evidence/scoreboard.md.
 """
 
 import math

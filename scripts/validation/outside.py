@@ -2,7 +2,7 @@
 
     python scripts/validation.py outside [--quick] [--only NAME] [--out DIR] [--rows FILE.csv]
 
-The rows of all runs are in docs/validation/outside.csv, the answer in docs/evidence/outside.md.
+Rows of all runs: docs/validation/outside.csv. Answer: docs/evidence/scoreboard.md.
 """
 
 import math
@@ -191,15 +191,36 @@ def throat(trial: Trial) -> Seen:
 
 
 def held(trial: Trial) -> Seen:
-    """fdnet's own pack and invasion, but for a line that keeps fines from touching each other."""
-    length, side, fines = (2.0, 1.6, 400) if trial.quick else (4.0, 2.0, 1000)
-    count = round(0.58 * length * side**2 / sphere_mass(0.25, 1.0))
+    """Fines of 1/`value` in loose packs of grains of 0.5 mm."""
+    size, fines = ((2.0, 1.6), 400) if trial.quick else ((4.0, 2.0), 1000)
+    count = round(0.58 * size[0] * size[1] ** 2 / sphere_mass(0.25, 1.0))
+    sand = {"radius_mm": 0.25, "count": count}
+    return single_fines(trial, sand, size, fine=0.25 / trial.value, fines=fines)
+
+
+def single_fines(
+    trial: Trial,
+    sand: Mapping[str, Any],
+    size: tuple[float, float],
+    *,
+    fine: float,
+    fines: int,
+    friction: float = 0.1,
+    stiffness: float = 1e4,
+    step: float = 0.2,
+) -> Seen:
+    """fdnet's own pack and invasion, but for a line that keeps fines from touching each other.
+
+    `sand` are keys of [grains]; `size` is length and side of the pack, and `fine` the radius of
+    the fines, mm. Contacts have the `stiffness`, N/m, and the time step `step` sqrt(m/k).
+    """
+    length, side = size
     tables = {
         "name": "passing",
         "seed": trial.seed,
         "box": {"size_mm": [length, side, side], "sides": "periodic"},
-        "grains": {"radius_mm": 0.25, "count": count, "friction": 0.1},
-        "fines": {"radius_mm": 0.25 / trial.value, "count": fines, "friction": 0.1},
+        "grains": {**sand, "friction": friction},
+        "fines": {"radius_mm": fine, "count": fines, "friction": friction},
         "fluid": {"velocity_m_s": 1.0},
         "contact": {"restitution": "dry"},
         "drag": {
@@ -208,9 +229,14 @@ def held(trial: Trial) -> Seen:
             "upstream": "interstitial",
             "pressure_gradient": False,
         },
-        "run": {"stiffness_N_m": 1e4, "duration_ms": 5 * length, "checkpoint_ms": 0.25 * length},
+        "run": {
+            "stiffness_N_m": stiffness,
+            "duration_ms": 5 * length,
+            "checkpoint_ms": 0.25 * length,
+            "time_step_factor": step,
+        },
     }
-    case = with_fines(case_from(set_keys(tables, ["run.time_step_factor=0.2"])))
+    case = with_fines(case_from(tables))
     grains, scales = packed(case, trial.folder.parent), invasion_scales(case)
     folder = trial.folder
     (folder / "post").mkdir(parents=True)
@@ -223,7 +249,7 @@ def held(trial: Trial) -> Seen:
     points.cut(None)
     launch = Launch(binary=the_binary())
     stage = InvadeStage(case=case, scales=scales, grains=grains, points=points, launch=launch)
-    run_deck(folder, "in.invade", replace(launch, follow=stage.keeper()))
+    run_deck(folder, "in.invade", replace(launch, follow=stage.follow))
     last = invade(case, scales, grains, folder, launch).history[-1]
     supplied = float(last.upstream + last.invaded + last.passed)
     overlap = max_overlap(grains, case.periodic)
@@ -491,7 +517,7 @@ def free(trial: Trial) -> Seen:
     case = with_fines(case_from(tables))
     scales, launch = invasion_scales(case), Launch(binary=the_binary())
     lone = resting(np.array([[2.7e-3, 3e-4, 3e-4]]), GRAIN, deck.specimen_box(case), Kind.GRAIN)
-    end = invade(case, scales, lone, trial.folder, launch).damaged.fines().velocity[0]
+    end = invade(case, scales, lone, trial.folder, launch).state.fines().velocity[0]
     share = 2 / 9 * FINE**2 * scales.porosity / scales.permeability
     slip = np.array([share * SPEED, 0.0, 0.0])
     if pull:

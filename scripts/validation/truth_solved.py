@@ -63,14 +63,14 @@ def made_pack(name: str) -> Snapshot:
     row = next(dict(row) for row in read_table("recipes") if row.pop("name") == name)
     kinds: dict[str, Any] = {"seed": int, "grains": int, "intact": str}
     recipe = Recipe(**{key: kinds.get(key, float)(text) for key, text in row.items() if text})
-    return _deposit(recipe) if recipe.intact else _grains(recipe)
+    return _deposit(recipe) if recipe.intact else random_grains(recipe)
 
 
 def _cube(position: Array, radius: Array, edge: float, kind: Array | Kind) -> Snapshot:
     return resting(position * MM, radius * MM, np.array([[0.0, edge * MM]] * 3), kind)
 
 
-def _grains(recipe: Recipe) -> Snapshot:
+def random_grains(recipe: Recipe) -> Snapshot:
     """Grains relaxed from random places, scaled until the porosity is the stated one."""
     rng = np.random.default_rng(recipe.seed)
     radius = 1.0 + (recipe.ratio - 1.0) * rng.random(recipe.grains)

@@ -7,6 +7,7 @@ from builders import tiny
 from campaign.samples import compared, finished_run
 
 import fdnet
+from fdnet.report.figures import DEPTH_LABEL
 from fdnet.statistics.bands import seeds_for_width
 from fdnet.statistics.differences import holm
 
@@ -28,7 +29,7 @@ def test_the_band_of_a_mean_is_students(tmp_path):
     assert summary["skin"]["seeds"] == 5
     single = compared(tmp_path / "one", {"a": [0.4]})
     assert ends(single.summary["k_reduction"]) == (0.4, None, None)
-    assert str(single) == "a: permeability lost 40 % (no band: one run), 1 seed."
+    assert single.ranking == ("a: permeability lost 40.0 % (no band: one run), 1 seed.",)
 
 
 def test_a_paired_difference_is_that_of_students_sleep_data(tmp_path):
@@ -127,7 +128,7 @@ def test_a_band_ends_where_its_quantity_does(tmp_path):
         assert ("cut at" in made.ranking[0]) == bool(cut)
         assert row["mean"] == pytest.approx(sum(values) / len(values))
     assert (
-        "95 % band 0 to 100 %, cut at 0 % and 100 %"
+        "95 % band 0.0 to 100.0 %, cut at 0.0 % and 100.0 %"
         in compared(tmp_path / "words", {"a": [0.5, 0.6]}).ranking[0]
     )
 
@@ -135,9 +136,10 @@ def test_a_band_ends_where_its_quantity_does(tmp_path):
 def test_one_variant_is_not_ranked(tmp_path):
     made = compared(tmp_path, {"mud": [0.3, 0.4, 0.5]})
     assert made.summary["ranking"] == []
-    assert str(made).startswith("mud: permeability lost 40 % (95 % band 15.2 to 64.8 %), 3 seeds")
+    assert str(made).startswith(
+        "mud: permeability lost 40.0 % (95 % band 15.2 to 64.8 %), 3 seeds"
+    )
     page = (made.path / "compare.html").read_text()
-    assert "Result" in page
     assert "Rank" not in page
     assert "best first" not in page
 
@@ -167,11 +169,15 @@ def test_runs_open_as_one_object_with_bands_by_quantity_and_by_depth(tmp_path):
     assert high == pytest.approx([(2 + half) * 1e-11] * 2, rel=1e-6)
     assert depth["k_damaged_m2_low"].tolist() == [0, 0]  # cut: no permeability is negative
     axes = runs.plot()
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("depth (mm)", "permeability in place (mD)")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == (DEPTH_LABEL, "permeability in place (mD)")
     assert not (tmp_path / "table.csv").exists()
     assert runs.table["skin"].tolist() == [1, 2, 3]
     written = fdnet.compare_runs(sorted(tmp_path.iterdir()), out=tmp_path / "compared")
     assert (written.summary["skin"], str(written)) == (runs.summary["skin"], str(runs))
+    page = (written.path / "compare.html").read_text()
+    # 2e-11 and 2.484e-11 m2 over 9.86923e-16
+    assert "20,260 mD<br>\n<small>0 to 45,440 mD, cut at 0 mD</small>" in page
+    assert page.count("data:image/svg+xml") == 1
 
 
 def test_runs_of_several_variants_open_by_variant(tmp_path):
@@ -190,3 +196,14 @@ def test_the_tables_are_read_with_their_types(tmp_path):
     values = made.table["layers_above_intact"]
     assert values.isna().tolist() == [False, True, False]
     assert made.table["seed"].tolist() == [1, 2, 3]
+
+
+def test_the_answer_names_the_variants_that_are_as_good(tmp_path):
+    """The gap of a and b changes from seed to seed, that of a and c does not."""
+    values = {"a": [0.30, 0.31, 0.32], "b": [0.36, 0.29, 0.34], "c": [0.60, 0.61, 0.63]}
+    made = compared(tmp_path, values)
+    page = " ".join((made.path / "compare.html").read_text().split())
+    assert "the smallest mean, but these seeds do not tell it apart from b.</p>" in page
+    apart = compared(tmp_path / "two", {"a": values["a"], "c": values["c"]})
+    page = (apart.path / "compare.html").read_text()
+    assert "It is the smallest, and differs from every other variant." in page

@@ -49,6 +49,19 @@ def planned(path: Path) -> tuple[dict, dict]:
     }
 
 
+def test_a_dry_run_says_the_time_and_writes_nothing(write, tmp_path, capsys):
+    path = write(GRID)
+    words = ["sweep", str(path), "--out", str(tmp_path / "out"), "--dry-run"]
+    assert main(words) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == 7
+    assert said[-1].startswith("12 runs: ")
+    assert said[-1].endswith("2 packs of grains serve several runs")
+    assert not (tmp_path / "out").exists()
+    assert main(["check", str(path)]) == 2
+    assert "is a sweep file and no case; fdnet sweep takes it" in capsys.readouterr().err
+
+
 def test_a_grid_is_every_combination_with_every_seed(write):
     """Fines and fluid are none of a pack's business: runs of one seed share theirs."""
     plan, cases = planned(write(GRID))
@@ -174,19 +187,19 @@ def test_muds_are_ranked_by_their_bands(write, capsys):
         for name, mean in (("bad", 0.5), ("close", 0.29), ("good", 0.1))
     }
     made = designed(write, losses, 'k_loss = "30 %"', capsys)
-    states = [(mud["name"], mud["state"]) for mud in made["design"]]
+    states = [(mud["name"], mud["state"]) for mud in made["candidates"]]
     assert states == [("good", "met"), ("close", "open"), ("bad", "missed")]
     assert made["targets"] == {"k_loss": pytest.approx(0.3)}
-    assert made["lines"][0].startswith("1. good meets every target: permeability lost 10 %")
+    assert made["lines"][0].startswith("1. good meets every target: permeability lost 10.0 %")
     assert "some 7 seeds would decide it" in made["lines"][1]
-    assert "1. good meets every target" in (write("").parent / "out/compare.html").read_text()
+    assert ">good meets every target" in (write("").parent / "out/compare.html").read_text()
 
 
 def test_bridging_is_the_share_that_passes(write, capsys):
     more = {"passed_count": [1, 3], "supplied_count": [100, 100]}
     targets = 'bridging = "1 %"\ndepth = "500 um"\nk_loss = "30 %"'
     made = designed(write, {"mud": [0.1, 0.2]}, targets, capsys, **more)
-    assert "pass through the specimen unbridged 2 % (95 %" in made["lines"][0]
+    assert "pass through the specimen unbridged 2.0 % (95 %" in made["lines"][0]
     assert made["targets"] == pytest.approx({"depth": 5e-4, "k_loss": 0.3, "bridging": 0.01})
 
 

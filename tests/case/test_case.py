@@ -57,7 +57,7 @@ def test_every_problem_is_listed_at_once():
 
 def test_a_bad_value_is_named_with_its_path():
     for part, values, expected in [
-        ("fines", {"radius_mm": 0.3}, "not below grains.radius_mm 0.25"),
+        ("fines", {"radius_mm": 0.3}, "expected below grains.radius_mm 0.25"),
         ("fines", {"slab_mm": 2.0}, "give one of the two, or none"),
         ("fines", {"concentration": 0.4}, "fines.concentration: 0.4"),
         ("grains", {"radius_mm": [0.3, 0.2]}, "must rise"),
@@ -121,8 +121,12 @@ def test_every_table_is_written():
     assert set(KEYS) == set(InvasionCase.model_fields)
     well = "well={radius_mm=108.0, drainage_radius_m=100.0}"
     clean_up, bonds = "clean_up.drawdown_MPa=1.0", "bonds={radius_ratio=0.5}"
-    settings = (well, clean_up, bonds, 'fluid.viscosity="10 cP"')
-    assert list(tiny(*settings).data()) == list(KEYS)
+    settings = (well, bonds, 'fluid.viscosity="10 cP"', "invasion.classes=8")
+    written = list(tiny(*settings, clean_up).data())
+    cake = ("invasion.method=network", "cake.permeability_m2=1e-18")
+    written.insert(written.index("clean_up"), "cake")
+    assert written == list(KEYS)
+    assert "cake" in tiny(*settings, *cake).data()
     assert "given" not in tiny(well).data()
     assert {"fines", "fines.radius_mm"} <= set(known_keys())
     with pytest.raises(CaseError, match="name"):
@@ -267,7 +271,10 @@ def test_bad_input_is_one_clear_error(tmp_path, capsys):
             ({"mud": '{ D10 = "20 um", D50_mm = 0.04, D50 = "40 um" }'}, "give one of the two"),
             ({"sand": SAND.replace("0.25 mm", "0.25")}, "'0.25': has no unit"),
             ({"mud": '{ D10 = "420 um", D50 = "430 um", D90 = "440 um" }'}, "above every throat"),
-            ({"mud": '{ D10 = "50 um", D50 = "150 um", D90 = "300 um" }'}, "is not below"),
+            (
+                {"mud": '{ D10 = "50 um", D50 = "150 um", D90 = "300 um" }'},
+                "solids as large as the grains",
+            ),
             (
                 {
                     "sand": '{ D50 = "0.40 mm", D90 = "0.402 mm" }',

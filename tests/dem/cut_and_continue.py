@@ -107,7 +107,7 @@ def end_of(result: Invasion, folder: Path) -> dict[str, Any]:
     restart = folder / "post" / f"invade_{result.history[-1].step}.restart"
     return {
         **{name: getattr(result, name) for name in names},
-        **{name: getattr(result.damaged, name).tolist() for name in columns},
+        **{name: getattr(result.state, name).tolist() for name in columns},
         "overlaps": list(read_watch(folder)),
         "restart": restart.read_bytes(),
     }

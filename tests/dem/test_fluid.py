@@ -81,7 +81,7 @@ def with_case(fluid, *more, scales=None, **way):
 
 
 def deposit_of(done) -> Snapshot:
-    return replace(done.damaged.fines(), velocity=np.zeros((len(done.damaged.fines()), 3)))
+    return replace(done.state.fines(), velocity=np.zeros((len(done.state.fines()), 3)))
 
 
 def test_batches_come_as_the_mud_that_slows_down_carries_them(go, fluid, tmp_path):
@@ -330,7 +330,7 @@ def test_a_face_is_plugged_once_all_that_moves_has_come_to_rest(go, fluid, tmp_p
     assert result.stop_reason == "plugged"
     assert crossed[-1] == crossed[-1 - chunks]
     assert any(one == two for one, two in zip(entered, entered[chunks:-1], strict=False))
-    spheres = result.damaged.fines()
+    spheres = result.state.fines()
     inside = (spheres.position[:, 0] >= 0) & (spheres.position[:, 0] < other.case.size_m[0])
     mean = spheres.velocity[inside, 0].mean() / other.scales.interstitial_velocity
     assert 0 < mean <= 0.01
@@ -386,6 +386,8 @@ def test_a_fine_stands_when_it_is_slower_than_half_of_what_it_was_given(fluid):
 
 class Watched:
     """A fluid whose answers are compared with what LIGGGHTS shows at the next update."""
+
+    keep = recall = lambda self, path: None
 
     def __init__(self, fluid):
         self.fluid, self.measured, self.answer, self.compared = fluid, fluid.measured, {}, 0
@@ -443,6 +445,7 @@ def test_the_fluid_is_asked_with_the_density_of_each_fine(grains_of, tmp_path):
 
     class Asked:
         measured = fluid.measured
+        keep = recall = lambda self, path: None
 
         def forces(self, spheres, moment):
             seen.append((spheres.fines(), moment.density))

@@ -57,9 +57,9 @@ def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(go, tmp_pat
     result = go(case, tmp_path)
     for row in result.history:
         assert row.upstream + row.invaded + row.passed == scales_of(case).supplied_count
-    x = result.damaged.fines().position[:, 0]
+    x = result.state.fines().position[:, 0]
     assert np.count_nonzero((x >= 0) & (x < case.size_m[0])) == result.history[-1].invaded
-    assert result.max_overlap < 0.1
+    assert result.overlap.fraction < 0.1
     assert (result.stop_reason == "duration") == (case.run.duration_ms is not None)
 
 
@@ -78,7 +78,7 @@ def test_a_batched_invasion_accounts_for_every_fine(go, tmp_path, scheme, forces
         == batches.supplied(batches.entered_at(last.chunk))
         == last.upstream + last.invaded + last.passed
     )
-    assert whole.max_overlap < (0.15 if forces else 0.1)
+    assert whole.overlap.fraction < (0.15 if forces else 0.1)
 
 
 def test_every_stop_reason_is_told_and_fines_that_pass_are_removed(go, tmp_path, monkeypatch):
@@ -99,7 +99,7 @@ def test_every_stop_reason_is_told_and_fines_that_pass_are_removed(go, tmp_path,
         said = any("the mud was cut off after" in warning for warning in result.warnings)
         assert said == (reason == "mud_cut_off")
     assert result.history[-1].passed > 0
-    assert len(result.damaged.fines()) == 200 - result.history[-1].passed
+    assert len(result.state.fines()) == 200 - result.history[-1].passed
     assert any("empty slab" in warning for warning in result.warnings)
 
 
@@ -126,17 +126,17 @@ def test_a_trickle_may_count_as_plugged(go, tmp_path):
 def test_the_neighbour_search_changes_time_not_motion(go, tmp_path):
     """It changes the order of sums: before chaos grows, positions agree to 1e-6 of a fine."""
     plain = go(tiny("run.duration_ms=0.04"), tmp_path / "plain")
-    assert plain.max_overlap > 0.01
+    assert plain.overlap.fraction > 0.01
     for key in ("skin_mm=0.01", "skin_mm=0.25", "neighbour_bin_mm=0.05", "neighbour_bin_mm=1.6"):
         own = go(tiny("run.duration_ms=0.04", f"run.{key}"), tmp_path / key)
-        near = np.allclose(own.damaged.position, plain.damaged.position, rtol=0, atol=1e-10)
+        near = np.allclose(own.state.position, plain.state.position, rtol=0, atol=1e-10)
         assert near, key
 
 
 def test_fixed_grains_do_not_move_and_mobile_ones_do(go, grains_of, tmp_path):
     for motion in ("fixed", "mobile"):
         case = tiny(f"grains.motion={motion}", "run.duration_ms=0.2")
-        ends = go(case, tmp_path / motion).damaged.grains().position
+        ends = go(case, tmp_path / motion).state.grains().position
         moved = np.max(np.abs(ends - grains_of(case).position))
         assert (moved > 0) == (motion == "mobile")
         assert moved < 0.2 * 0.25e-3
@@ -217,6 +217,6 @@ def test_watching_does_not_move_a_single_bit(go, tmp_path, monkeypatch):
     monkeypatch.setattr(invade_deck, "watch_variables", lambda *_: None)
     alone = go(case, tmp_path / "alone")
     assert not (tmp_path / "alone" / "overlap.csv").exists()
-    assert np.array_equal(watched.damaged.position, alone.damaged.position)
+    assert np.array_equal(watched.state.position, alone.state.position)
     assert watched.overlap == deepest_of(read_watch(tmp_path / "watched"))
-    assert watched.max_overlap > alone.max_overlap > 0
+    assert watched.overlap.fraction > alone.overlap.fraction > 0

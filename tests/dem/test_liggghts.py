@@ -84,7 +84,7 @@ def test_a_run_is_stopped_at_its_time_limit(fake, tmp_path):
     for mode, follow in (("hang", None), ("flood", lambda line: time.sleep(0.01))):
         start = time.monotonic()
         with pytest.raises(LiggghtsError, match="did not end within its time limit"):
-            run(fake, tmp_path, mode, timeout=0.5, follow=follow)
+            run(fake, tmp_path, mode, deadline=time.monotonic() + 0.5, follow=follow)
         assert time.monotonic() - start < 10, mode
 
 
@@ -168,4 +168,4 @@ def test_a_run_that_floods_its_screen_or_log_is_stopped(fake, tmp_path, monkeypa
     monkeypatch.setattr("fdnet.dem.liggghts.MOST_BYTES", 1 << 20)
     for mode in ("flood", "zeros", "log"):
         with pytest.raises(LiggghtsError, match=r"LIGGGHTS wrote more than 1 MiB into .*; "):
-            run(fake, tmp_path, mode, timeout=60.0)
+            run(fake, tmp_path, mode, deadline=time.monotonic() + 60.0)

@@ -186,7 +186,7 @@ def fallen(case: Case, binary, folder: Path) -> tuple[Snapshot, float]:
     lonely = resting_spheres(place, 2.5e-4, box, kind=Kind.GRAIN)
     result = invade(case, scales, lonely, folder, Launch(binary=binary))
     assert result.stop_reason == "duration"
-    return result.damaged, result.history[-1].step * scales.time_step
+    return result.state, result.history[-1].step * scales.time_step
 
 
 PULL = np.array([60.0, -45.0, -100.0])

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import signal
+import time
 from importlib import metadata
 from itertools import product
 from pathlib import Path
@@ -13,7 +14,15 @@ import pytest
 from builders import followed, tiny
 from cut_and_continue import MATRIX, cell_case, differences
 
-from fdnet.dem.checkpoint import UPDATES, Checkpoints, file_digest, read_history, read_updates
+from fdnet.dem.checkpoint import (
+    UPDATES,
+    WATCH,
+    Checkpoints,
+    file_digest,
+    read_history,
+    read_updates,
+    rows_digest,
+)
 from fdnet.dem.invasion import invade, steps_between
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.supply import batches_of
@@ -103,7 +112,7 @@ def points(folder, case=CASE) -> Checkpoints:
 
 def same(one, other) -> bool:
     return one.history == other.history and np.array_equal(
-        one.damaged.position, other.damaged.position
+        one.state.position, other.state.position
     )
 
 
@@ -152,7 +161,7 @@ def test_a_restart_cut_by_a_full_disk_is_set_aside(go, cut):
 def test_a_zeroed_restart_is_passed_over_with_a_warning(go, cut):
     folder, whole = cut
     zeros(folder / "post" / f"invade_{whole.history[-1].step}.restart")
-    again = go(CASE, folder, timeout=60.0)
+    again = go(CASE, folder, deadline=time.monotonic() + 60.0)
     assert same(again, whole)
     (new,) = set(again.warnings) - set(whole.warnings)
     assert f"went on from the checkpoint at step {whole.history[-2].step}" in new
@@ -262,27 +271,57 @@ def test_a_continued_invasion_in_the_network_s_field_is_the_uncut_one(
     assert differences(case, grains_of(case), tmp_path, binary) == []
 
 
+RISING = followed(*SLOWER, "run.stiffness_N_m=auto", way="fluid.darcy_length_mm=8.0")
+
+
+@pytest.fixture(scope="module")
+def rising(go, tmp_path_factory):
+    """An invasion whose springs grow with the load, finished: folder and result."""
+    folder = tmp_path_factory.mktemp("rising")
+    return folder, go(RISING, folder)
+
+
 def test_springs_that_grow_with_the_load_keep_overlaps_small_and_go_on_bit_for_bit(
-    go, binary, grains_of, tmp_path
+    rising, binary, grains_of, tmp_path
 ):
-    case = followed(*SLOWER, "run.stiffness_N_m=auto", way="fluid.darcy_length_mm=8.0")
-    whole = go(case, tmp_path / "alone")
+    (folder, whole), case = rising, RISING
     steps = np.diff([0, *(row.step for row in whole.history)])
     assert steps[-1] > steps[0], "no spring was stiffened"
-    assert 0.01 < whole.max_overlap < 0.03
+    assert 0.01 < whole.overlap.fraction < 0.04, "3 % are aimed at"
     times = [row["time_s"] for row in whole.updates]
     scales = scales_of(case)
     chunk, usual = scales.checkpoint_steps * scales.time_step, scales.contacts["grain-grain"]
-    deck = (tmp_path / "alone" / "in.invade.resume").read_text()
+    deck = (folder / "in.invade.resume").read_text()
     step = float(deck.split("\ntimestep ")[1].split()[0])
     spring = float(deck.split(" kn peratomtypepair 3 ")[1].split()[0])
     assert step < scales.time_step
     bound = usual.normal_stiffness * scales.time_step**2
     assert spring * step**2 == pytest.approx(bound, rel=1e-9)
+    more = steps[-1] / steps[0]
+    assert scales.time_step / whole.last.time_step == pytest.approx(more)
+    assert whole.last.stiffness / scales.stiffness == pytest.approx(more**2)
     assert [one / chunk for one in times if round(one / chunk, 9) % 1 == 0] == pytest.approx(
         range(len(steps))
     )
     assert differences(case, grains_of(case), tmp_path, binary) == []
+
+
+@pytest.mark.parametrize("spoil", [noise, Path.unlink])
+def test_springs_do_not_follow_from_a_dump_that_is_not_the_recorded_one(
+    go, rising, tmp_path, spoil
+):
+    """Without watched overlaps the springs of a chunk follow from the dumps of the two before."""
+    folder, whole = Path(shutil.copytree(rising[0], tmp_path / "cut")), rising[1]
+    (folder / WATCH).unlink()
+    for row in whole.history[-1:]:
+        for suffix in ("dump", "restart", "record"):
+            points(folder, RISING).path(row.step, suffix).unlink()
+    for row in whole.history[:-1]:
+        record = points(folder, RISING).record(row.step)._replace(overlap=rows_digest([]))
+        points(folder, RISING).store(row.step, record)
+    spoil(points(folder, RISING).path(whole.history[-3].step, "dump"))
+    with pytest.raises(LiggghtsError, match="the springs of the next chunk follow from it"):
+        go(RISING, folder)
 
 
 @pytest.mark.nightly
@@ -337,10 +376,10 @@ def test_liggghts_that_is_killed_is_reported_and_the_run_goes_on_bit_for_bit(
 
 
 def test_what_goes_wrong_while_liggghts_waits_is_reported(binary, tmp_path):
-    for command, timeout, message in (
+    for command, limit, message in (
         ("nonsense 1", None, "ERROR: Unknown command: nonsense"),
         ("shell sleep 30", 1.0, "did not end within its time limit"),
     ):
-        launch = Launch(binary=binary, timeout=timeout)
+        launch = Launch(binary=binary, deadline=limit and time.monotonic() + limit)
         with pytest.raises(LiggghtsError, match=message):
             run_deck(tmp_path, "in.none", launch, lambda feed, one=command: feed(one))

@@ -211,7 +211,7 @@ def test_free_fines_are_where_the_fluid_has_carried_them(binary, tmp_path):
         for fines, place in in_the_slab(case, scales, far)
         for number, x in zip(fines.id, place[:, 0], strict=True)
     }
-    fines = result.damaged.fines()
+    fines = result.state.fines()
     came = np.array([start[int(number)] for number in fines.id])
     moved = scales.upstream_velocity * last.step * scales.time_step
     assert last.invaded > 100

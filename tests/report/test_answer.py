@@ -129,6 +129,15 @@ def test_a_layer_that_seems_to_gain_is_made_up_for_and_nothing_is_cut_off():
     assert steps_of(analysis_of([(0.0, 2e-3, 2.0, 1.0)], much)) == [step(0.0, 2e-3, 2.0, 1.0)]
 
 
+def test_a_layer_that_two_sections_share_counts_in_each_with_its_part():
+    """Half of the last layer, 0.2 mm of k 1, and 0.8 mm of k 2 beyond make a section of 1 mm."""
+    thin = [(0.0, 4e-4, 4.0, 4.0), (4e-4, 8e-4, 1.0, 1.0)]
+    series = 1e-3 / (2e-4 / 1.0 + 8e-4 / 2.0)
+    sections = [(0.0, 6e-4, 2.0, 2.0), (6e-4, 1.6e-3, series, series)]
+    *_, rest = steps_of(analysis_of(sections, thin))
+    assert rest == pytest.approx(step(8e-4, 1.6e-3, 2.0, 2.0))
+
+
 def test_values_in_place_above_the_intact_ones_are_counted():
     sections = [(0.0, 1e-3, 2.0, 2.0 * (1 + 1e-4)), (1e-3, 2e-3, 2.0, 2.4)]
     layers = [(0.0, 5e-4, 2.0, 2.4), (5e-4, 1e-3, 2.0, 1.0), (1e-3, 2e-3, 2.0, 2.1)]
@@ -255,8 +264,12 @@ def test_each_number_of_two_laws_names_its_own():
     more |= {"invasion_depth_m": 2e-3, "cake_thickness_m": 0.0, "law": "thesis", **counts}
     said = {one.name: one.text for one in facts(SUMMARY | more | FLOW)}
     assert said["permeability"].endswith("26.7 % lost by the law thesis")
-    assert said["flow"].startswith("72.2 % lost as the flow met it last: by section-archie with")
-    assert "flow" not in {one.name for one in facts(SUMMARY | more | {"damage_law": "thesis"})}
+    assert said["k of the flow"].startswith(
+        "72.2 % lost as the simulated flow met it last: by section-archie with"
+    )
+    assert "k of the flow" not in {
+        one.name for one in facts(SUMMARY | more | {"damage_law": "thesis"})
+    }
 
 
 def test_the_answer_is_a_sentence_to_act_on():

@@ -201,7 +201,7 @@ def test_without_vtk_a_run_lacks_those_files_alone_and_says_so(
     answer, said = capsys.readouterr()
     assert "permeability" in answer
     assert said.count("warning: no 3-D picture and no ParaView files") == 1
-    lost = {"spheres.pvd", "invasion.pvd", "frames", "figures/spheres_3d.png"}
+    lost = {"spheres.pvd", "invasion.pvd", "frames", "figures/spheres_3d.png", "paraview_view.py"}
     gone = {str(path.relative_to(finished.path)) for path in finished.path.rglob("*")}
     gone -= {str(path.relative_to(folder)) for path in folder.rglob("*")}
     assert lost <= gone <= lost | {name for name in gone if name.endswith(".vtp")}

@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 from builders import naming, tiny
 
+from fdnet import run_case
 from fdnet.cli import main
 
 pytestmark = pytest.mark.liggghts
@@ -319,6 +320,11 @@ def test_a_cut_run_has_a_provisional_answer_until_it_goes_on(whole, tmp_path):
     start = f"Provisional, at {100 * said['share_done']:.1f} % of the invasion: so far"
     assert said["answer"].startswith(start)
     assert start in (out / "report.html").read_text().replace("&nbsp;", " ")
+    from_python = run_case(case, out, resume=True, stages=["analyse"])
+    assert (from_python.final, from_python.answer) == (False, said["answer"])
+    assert from_python.k_damaged_m2 == said["k_damaged_m2"]
+    assert len(from_python.history) == len(read)
+    assert from_python.sections["fines_count"].sum() == said["invaded_count"]
     assert left() == before
     assert not (out / "manifest.json").exists()
     assert fdnet("run", case, "--out", out, *words).returncode == 2

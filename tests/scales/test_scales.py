@@ -468,7 +468,7 @@ def test_driven_fines_go_the_same_way_in_a_part_of_the_time(binary, tmp_path):
         grains = resting_spheres(centres, 1.7e-4, box, kind=Kind.GRAIN)
         folder = tmp_path / str(velocity)
         result = invade(case, scales_of(case), grains, folder, Launch(binary=binary))
-        fines = result.damaged.fines()
+        fines = result.state.fines()
         return fines.position[np.argsort(fines.id)]
 
     away = ends(0.15) - ends(0.05)

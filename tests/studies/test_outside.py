@@ -1,8 +1,9 @@
-"""Comparisons with numbers from outside: statistics, set-ups, quick forms, committed rows."""
+"""Comparisons with numbers from outside, and the scoreboard: set-ups, quick forms, rows."""
 
+import numpy as np
 import pytest
 
-from validation import mechanics, outside
+from validation import mechanics, outside, scoreboard
 from validation.comparisons import findings, read_rows, table
 
 OPEN = {
@@ -45,7 +46,7 @@ def test_a_quick_form_agrees_and_gives_the_committed_numbers(chapter, name, root
     assert chapter.main(command) == 0
     rows = read_rows(tmp_path / f"{own}.csv")
     assert set(rows.status) == {"done"}
-    assert all(one.verdict == "agrees" for one in findings(chapter.CHAPTER.comparisons, rows))
+    assert all(one.verdict == "holds" for one in findings(chapter.CHAPTER.comparisons, rows))
     keys = ["comparison", "value", "seed", "quantity"]
     known = read_rows(root / "docs" / "validation" / f"{own}.csv")
     texts = [one.assign(value=one.value.astype(str)) for one in (rows, known)]
@@ -67,14 +68,34 @@ def test_a_command_goes_on_where_it_was_stopped(tmp_path, capsys):
     path.write_text(first.replace("0.0145", "0.0146"))
     assert outside.main(command) == 0
     assert path.read_text() == first.replace("0.0145", "0.0146")
-    assert "agrees" in capsys.readouterr().out
+    assert "holds" in capsys.readouterr().out
 
 
-def test_the_page_has_the_table_of_the_committed_rows(root):
-    page = (root / "docs" / "evidence" / "outside.md").read_text(encoding="utf-8")
-    lines = []
-    for chapter, own in ((outside, "outside"), (mechanics, "mechanics")):
-        rows = read_rows(root / "docs" / "validation" / f"{own}.csv")
-        lines += findings(chapter.CHAPTER.comparisons, rows)
-    assert table([line for line in lines if line.source != mechanics.ITSELF]) in page
-    assert {line.what for line in lines if line.verdict == "**disagrees**"} == OPEN
+@pytest.mark.liggghts
+@pytest.mark.parametrize("row", ["1", "6", "8"])
+def test_a_quick_row_of_the_scoreboard_holds(row, tmp_path):
+    assert scoreboard.main(["--quick", "--only", row, "--out", str(tmp_path)]) == 0
+    rows = read_rows(tmp_path / "scoreboard.csv")
+    lines = findings(scoreboard.CHAPTER.comparisons, rows)
+    own = [line.verdict for line in lines if line.what.startswith(f"{row}: ")]
+    assert own == ["holds"] * 2
+
+
+def test_the_page_has_the_tables_of_the_committed_rows(root):
+    """A line of the scoreboard that another chapter keeps is not said a second time."""
+    page = (root / "docs" / "evidence" / "scoreboard.md").read_text(encoding="utf-8")
+    rows = read_rows(root / "docs" / "validation" / "scoreboard.csv")
+    board = findings(scoreboard.CHAPTER.comparisons, rows[rows.status == "done"])
+    assert table(board) in page
+    said = {line.what.partition(": ")[2] for line in board}
+    lines = [line for name in ("outside", "mechanics") for line in scoreboard.kept(name)]
+    others = [line for line in lines if line.source != mechanics.ITSELF and line.what not in said]
+    assert table(others) in page
+    assert {one.what for one in lines if one.verdict == "**does not hold**"} == OPEN
+
+
+def test_gamma_of_a_ball_that_a_plane_halves():
+    """Half of a ball lies below a plane through its centre; whole balls and none elsewhere."""
+    volume = scoreboard.ball_between(np.array([0.0, 0.5, 3.0]), np.full(3, 1.0), 0.0, 2.0)
+    ball = 4 / 3 * np.pi
+    assert volume == pytest.approx([ball / 2, ball * 27 / 32, 0.0])

@@ -1,0 +1,1 @@
+"""Deposits of a mud as size classes: concentrations that a pore network carries and holds back."""

@@ -1,0 +1,267 @@
+"""The solids finer than the cut of `invasion.method` = "both", beside the spheres of LIGGGHTS.
+
+At each update of the flow they are carried on by the fluid that has passed since the one before,
+as the fast model carries them. The spheres that stand in a pore, or in the cake, count there as
+one more class, which holds finer ones. What the classes add to a side of a throat multiplies what
+the spheres leave of it,
+
+    kept = kept(spheres) r(spheres) / r(spheres and classes),
+
+with the resistance r of the side by the fast model. A throat to which the spheres leave the share
+s of its conductance lets pass what is narrower than s^(1/4) of its passage, since the conductance
+of an opening goes with the fourth power of its width. Spheres move through what the classes left.
+"""
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from fdnet.case.case import InvasionCase
+from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient, mud_classes
+from fdnet.classes.deposit import (
+    Deposits,
+    Sieve,
+    advanced,
+    holding,
+    kept_shares,
+    no_solids,
+    sieve_of,
+    thickness_of_cake,
+)
+from fdnet.classes.invasion import bed_of, cake_permeability, cake_resistance
+from fdnet.classes.transport import streams_of
+from fdnet.files import replacing
+from fdnet.network.flow.flow import Flow
+from fdnet.network.network import Network
+from fdnet.scales.scales import InvasionScales
+from fdnet.spheres.snapshot import Array
+
+CLASS_COLUMNS = ("classes_inside_m3", "classes_passed_m3", "classes_cake_m3", "classes_missing")
+"""Volume of all classes in the specimen, beyond it and before it; error of their ledger."""
+
+
+CHANGED = 0.2
+"""Share of the classes at rest that may come before the network is solved anew."""
+
+
+class Passed(NamedTuple):
+    """The fluid that has passed since the update before.
+
+    Attributes:
+        before: m3 in all, up to that update.
+        now: m3 in all.
+        velocity: m/s, superficial, of the fluid itself.
+    """
+
+    before: float
+    now: float
+    velocity: float
+
+
+class Stands(NamedTuple):
+    """The spheres that stand.
+
+    Attributes:
+        factor: (T, 2) share of its clean conductance that they leave to each side.
+        in_pores: (P,) m3 in each pore, over the share of the pore inside the box.
+        cake: m3 before the face.
+    """
+
+    factor: Array
+    in_pores: Array
+    cake: float
+
+
+class Narrowed(NamedTuple):
+    """What solids finer than the spheres do.
+
+    Attributes:
+        kept: (T, 2) share of its clean conductance that all leave to a side.
+        volume: (G,) m3 at rest in groups of pores.
+        grown: whether the network must be solved anew for it.
+    """
+
+    kept: Array
+    volume: Array
+    grown: bool
+
+
+@dataclass(slots=True, eq=False, kw_only=True)
+class FinerClasses:
+    """Where the finer classes (C) are, from one update to the next.
+
+    Attributes:
+        network: of the grains, with pores in N groups and throats (T).
+        sieve: the same as solids meet it.
+        classes: (C) and, as the last one, the spheres.
+        bed: grains and fluid, for what sticks to them.
+        sticking: share of the contacts with grains that stick.
+        mud: m3 that come at most.
+        cake: m2, permeability of the cake of classes, where the case gives it.
+        solids: of the classes (C).
+        kept: (T, 2) share that the classes leave of what the spheres leave.
+        flux: (T,) m3, of the last solve.
+        pressure: (N,) of the last solve.
+        solved: m3 of them that the last solve knew.
+    """
+
+    network: Network
+    sieve: Sieve
+    classes: SizeClasses
+    bed: Bed
+    sticking: float
+    mud: float
+    cake: float | None
+    solids: Deposits
+    kept: Array
+    flux: Array
+    pressure: Array
+    solved: float = 0.0
+
+    def among(self, passed: Passed, spheres: Stands) -> Narrowed:
+        """Carry the classes on by what `passed`, among the `spheres` that stand."""
+        step = passed.now - passed.before
+        sieve = replace(
+            self.sieve, passage=self.sieve.passage * np.min(spheres.factor, axis=1) ** 0.25
+        )
+        if step > 0:
+            share = np.clip((self.mud - passed.before) / step, 0.0, 1.0)
+            classes = replace(self.classes, concentration=share * self.classes.concentration)
+            streams = streams_of(
+                *(sieve.ends, self.flux, self.pressure), inlet=sieve.inlet, outlet=sieve.outlet
+            )
+            solids = self._among(self.solids, spheres)
+            bed = replace(self.bed, velocity=passed.velocity)
+            sticks = filter_coefficient(classes, bed, self.sticking)
+            what = holding(sieve, solids, classes, streams, sticks)
+            _, after = advanced(sieve, solids, classes, streams, what, step)
+            self.solids = Deposits(
+                **{one.name: getattr(after, one.name)[..., :-1] for one in fields(Deposits)}
+            )
+        alone = replace(self.solids, **{name: 0.0 * getattr(self.solids, name) for name in HELD})
+        left = [
+            kept_shares(self.sieve, self._among(one, spheres), self.classes)
+            for one in (self.solids, alone)
+        ]
+        # loosely packed spheres among fine solids may seem to make room: they make none
+        self.kept = np.minimum(left[0] / left[1], 1.0)
+        held, rest = self._held, self.solids.in_pores + self.solids.attached
+        grown = held - self.solved > CHANGED * held
+        return Narrowed(spheres.factor * self.kept, rest.sum(axis=1), grown)
+
+    def _among(self, solids: Deposits, spheres: Stands) -> Deposits:
+        """The solids with the standing spheres as the last class."""
+        network, columns = self.network, {}
+        inside = spheres.in_pores * network.pore_share
+        standing = {
+            "in_pores": np.bincount(network.pore_group, inside, len(self.sieve.void)),
+            "cake": np.array(spheres.cake),
+        }
+        for one in fields(Deposits):
+            values = getattr(solids, one.name)
+            last = standing.get(one.name, np.zeros(values.shape[:-1]))
+            columns[one.name] = np.concatenate([values, last[..., None]], axis=-1)
+        return Deposits(**columns)
+
+    @property
+    def _held(self) -> float:
+        return float(sum(getattr(self.solids, name).sum() for name in HELD))
+
+    def solve(self, flow: Flow) -> None:
+        """Take the `flow` of the last solve."""
+        if self.flux is flow.throat_flux:
+            return
+        first = np.unique(self.network.pore_group, return_index=True)[1]
+        self.flux, self.pressure = flow.throat_flux, flow.pore_pressure[first]
+        self.solved = self._held
+
+    @property
+    def own(self) -> SizeClasses:
+        """The classes (C) without the spheres."""
+        return without_last(self.classes)
+
+    @property
+    def resistance(self) -> float:
+        """1/m, of what lies of them before the face."""
+        return cake_resistance(self.cake, self.sieve, self.solids, self.own)
+
+    @property
+    def thickness(self) -> float:
+        """m, of what lies of them before the face."""
+        return thickness_of_cake(self.sieve, self.solids)
+
+    @property
+    def measures(self) -> dict[str, float]:
+        """`CLASS_COLUMNS`."""
+        solids = self.solids
+        volumes = (solids.inside_by_class, solids.passed, solids.cake)
+        values = [float(one.sum()) for one in volumes]
+        missing = float(np.abs(solids.missing).max())
+        return dict(zip(CLASS_COLUMNS, (*values, missing), strict=True))
+
+    def keep(self, path: Path) -> None:
+        """Write all that the next update needs."""
+        arrays = {one.name: getattr(self.solids, one.name) for one in fields(Deposits)}
+        with replacing(path) as part:
+            np.savez(part, kept=self.kept, flux=self.flux, pressure=self.pressure, **arrays)
+
+    def recall(self, path: Path) -> None:
+        """Read it back."""
+        with np.load(path) as data:
+            self.solids = Deposits(**{one.name: data[one.name] for one in fields(Deposits)})
+            self.kept, self.flux, self.pressure = data["kept"], data["flux"], data["pressure"]
+
+    def forget(self) -> None:
+        """Begin anew: no mud has come."""
+        self.solids = no_solids(self.sieve, self.own)
+        self.kept = np.ones(self.sieve.ends.shape)
+
+
+HELD = ("in_pores", "attached", "in_throats")
+"""The solids at rest in the specimen."""
+
+
+def without_last(classes: SizeClasses) -> SizeClasses:
+    """The classes but for the last one."""
+    return SizeClasses(**{one.name: getattr(classes, one.name)[:-1] for one in fields(classes)})
+
+
+def finer_classes(
+    case: InvasionCase, scales: InvasionScales, network: Network, halves: Array, flow: Flow
+) -> FinerClasses | None:
+    """What is finer than the cut of a case before its mud comes; None where nothing is.
+
+    `halves` (T, 2) 1/m3 are the resistances of the clean sides, `flow` is through these.
+    """
+    choices, fines = case.invasion, case.fines
+    if choices is None:
+        return None
+    finer = mud_classes(fines, choices.classes, below=fines.finest_m)
+    if not len(finer.diameter):
+        return None
+    coarse = {
+        "low": 2.0 * fines.radius_range_m[0],
+        "high": 2.0 * fines.radius_range_m[1],
+        "diameter": fines.sauter_diameter_m,
+        "concentration": 0.0,
+        "density": fines.mean_density_kg_m3,
+    }
+    classes = {name: np.append(getattr(finer, name), one) for name, one in coarse.items()}
+    sieve = sieve_of(network, halves, flow.throat_flux)
+    made = FinerClasses(
+        network=network,
+        sieve=sieve,
+        classes=SizeClasses(**classes),
+        bed=bed_of(case, scales, scales.darcy_velocity),
+        sticking=choices.sticking,
+        mud=scales.slab_length * sieve.area,
+        cake=cake_permeability(case),
+        solids=no_solids(sieve, finer),
+        kept=np.ones(sieve.ends.shape),
+        flux=np.zeros(0),
+        pressure=np.zeros(0),
+    )
+    made.solve(flow)
+    return made

@@ -1,0 +1,372 @@
+"""Where solids that were held sit, what they leave of passages and conductances, and the cake.
+
+The first fine that a throat holds sits in the throat, the next ones in the pore before it. A pore
+is full when its void is packed at the porosity `PACKED`. What flows on through a full pore leaves
+behind whatever is wider than the gaps of its bed, and so does the cake, which is what the full
+pores of the face turn away.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fdnet.classes.capture import (
+    TIGHT,
+    SizeClasses,
+    bridging_chance,
+    covered,
+    wider_share,
+)
+from fdnet.classes.transport import Streams, Swept, carry
+from fdnet.network.flow.flow import PLANE_TOLERANCE
+from fdnet.network.network import Network
+from fdnet.spheres.snapshot import Array, frozen, one_line
+
+PACKED = 0.40
+"""Porosity of the solids in a full pore, and of a cake whose permeability is not given."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Sieve:
+    """Pores (N) and throats (T) as solids meet them, SI units; a pore is a group of `Network`.
+
+    Attributes:
+        ends: (T, 2) the pores that a throat joins.
+        passage: (T,) m, diameter of the largest sphere that passes the clean throat.
+        opening: (T,) m, radius of the circle of its open area.
+        halves: (T, 2) 1/m3, resistances of the sides of the clean throat.
+        way: (T,) m, length of the throat over the tortuosity.
+        void: (N,) m3 inside the box.
+        room: (N,) m, cubic root of the mean void of the tetrahedra that make up a pore.
+        surface: (N,) m2 of grains.
+        place: (N, 3) m.
+        throat_place: (T, 3) m.
+        inlet: (N,) whether a pore lies on the formation face.
+        outlet: (N,) whether it lies on the other end.
+        area: m2, of the face.
+        length: m, of the specimen.
+    """
+
+    ends: Array
+    passage: Array
+    opening: Array
+    halves: Array
+    way: Array
+    void: Array
+    room: Array
+    surface: Array
+    place: Array
+    throat_place: Array
+    inlet: Array
+    outlet: Array
+    area: float
+    length: float
+
+    __repr__ = one_line
+
+
+def sieve_of(network: Network, halves: Array, flux: Array) -> Sieve:
+    """The sieve of a network; `halves` (T, 2) 1/m3 and `flux` (T,) are those of clean throats."""
+    group, size = network.pore_group, np.ptp(network.box, axis=1)
+    count = int(group.max()) + 1
+    first = np.unique(group, return_index=True)[1]
+    place = network.pore_position[first]
+    (low, high), reach = network.box[0], PLANE_TOLERANCE * size[0]
+    two = network.throat_ends
+    along = (two[:, 1, 0] - two[:, 0, 0]) * flux
+    winding = float(np.sum(network.throat_length * np.abs(flux))) / max(float(along.sum()), 1e-300)
+    whole = np.maximum(network.pore_volume, 0.0)
+    middle = network.throat_corner.mean(axis=1)
+    middle[:, 1:] = (middle[:, 1:] - network.box[1:, 0]) % size[1:] + network.box[1:, 0]
+    return Sieve(
+        ends=frozen(group[network.throat_pores]),
+        passage=frozen(2.0 * network.throat_radius),
+        opening=frozen(np.maximum(network.throat_radius_effective, network.throat_radius)),
+        halves=frozen(np.where(np.isfinite(halves), halves, 0.0)),
+        way=frozen(network.throat_length / max(winding, 1.0)),
+        void=frozen(np.bincount(group, whole * network.pore_share)),
+        room=frozen(np.cbrt(np.bincount(group, whole) / np.bincount(group))),
+        surface=frozen(np.bincount(group, network.pore_wall_surface * network.pore_share, count)),
+        place=frozen(place),
+        throat_place=frozen(middle),
+        inlet=frozen(place[:, 0] <= low + reach),
+        outlet=frozen(place[:, 0] >= high - reach),
+        area=network.area,
+        length=float(size[0]),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Deposits:
+    """Where the solids of classes (C) are, m3: in pores (N), throats (T), the cake, and beyond.
+
+    Attributes:
+        carried: (N, C) in the fluid of the pores.
+        in_pores: (N, C) held in pores.
+        attached: (N, C) stuck to the grains of pores.
+        in_throats: (T, C) held in throats.
+        cake: (C,) before the face.
+        passed: (C,) through the outlet.
+        supplied: (C,) all that came to the face.
+    """
+
+    carried: Array
+    in_pores: Array
+    attached: Array
+    in_throats: Array
+    cake: Array
+    passed: Array
+    supplied: Array
+
+    __repr__ = one_line
+
+    @property
+    def missing(self) -> Array:
+        """(C,) what the ledger does not find again, over what was supplied; rounding."""
+        found = self.inside_by_class + self.cake + self.passed
+        return np.asarray((self.supplied - found) / np.maximum(self.supplied, 1e-300))
+
+    @property
+    def inside(self) -> tuple[Array, Array, Array, Array]:
+        """What is in the specimen, by pore or throat."""
+        return self.carried, self.in_pores, self.attached, self.in_throats
+
+    @property
+    def inside_by_class(self) -> Array:
+        """(C,) m3 in the specimen."""
+        return np.sum([one.sum(axis=0) for one in self.inside], axis=0)
+
+
+def no_solids(sieve: Sieve, classes: SizeClasses) -> Deposits:
+    """A specimen that no mud has reached."""
+    pores, count = len(sieve.void), len(classes.diameter)
+    nothing = np.zeros((pores, count))
+    return Deposits(
+        carried=nothing,
+        in_pores=nothing.copy(),
+        attached=nothing.copy(),
+        in_throats=np.zeros((len(sieve.ends), count)),
+        cake=np.zeros(count),
+        passed=np.zeros(count),
+        supplied=np.zeros(count),
+    )
+
+
+# ------------------------------------------------------------------------------------------------
+# What the deposit leaves of passages, pores and conductances.
+
+
+LOOSE = 0.29
+"""Share by which solids in a pore pack less densely, for each of their diameters over the cubic
+root of its void: 0.55 of the void at 0.35, 0.42 at 0.9, 0.38 at 1.2 (docs/theory/size_classes)."""
+FULL = 0.95
+"""Filled share from which a pore begins to act as a bed."""
+ADDED, BED = 1210.0, 855.0
+"""Resistance that a deposit adds to a side of a throat, times (d l)^1.5 and d^2 l, over the square
+of the share of the void that it takes: measured for large fines, and Carman and Kozeny's bed."""
+WEDGES = 1.3
+"""A fine up to so many passages wide sits in the throat that holds it, a wider one before it."""
+
+
+def wedged(solids: Deposits, classes: SizeClasses) -> Array:
+    """Number (T,) of fines in each throat, at most 1."""
+    return np.minimum(solids.in_throats @ (1.0 / classes.volume), 1.0)
+
+
+class Loads(NamedTuple):
+    """What the deposit takes of pores (N)."""
+
+    share: Array
+    """(N,) of the void."""
+    filled: Array
+    """(N,) over the share of a full pore."""
+    diameter: Array
+    """(N,) m, Sauter mean; 0 where there is none."""
+
+
+def loads_of(
+    sieve: Sieve, solids: Deposits, classes: SizeClasses, *, with_attached: bool = False
+) -> Loads:
+    """The loads of the pores; a fine in a throat counts half for each side.
+
+    What sticks to the grains is no pile that stops others, but narrows the pore all the same.
+    """
+    count, half = len(sieve.void), 0.5 * solids.in_throats
+    held = solids.in_pores + solids.attached if with_attached else solids.in_pores
+    held = held + sum(_gathered(ends, half, count) for ends in sieve.ends.T)
+    size = bed_diameter(held, classes)
+    share = np.divide(held.sum(axis=1), sieve.void, out=np.zeros(count), where=sieve.void > 0)
+    wide = np.divide(size, sieve.room, out=np.zeros(count), where=sieve.room > 0)
+    full = (1.0 - PACKED) * np.maximum(1.0 - LOOSE * wide, 0.25)
+    return Loads(share=share, filled=share / full, diameter=size)
+
+
+def _gathered(where: Array, values: Array, count: int) -> Array:
+    """Sums (count, C) of rows (K, C) that belong to the same of `count` pores."""
+    return np.stack([np.bincount(where, one, count) for one in values.T], axis=1)
+
+
+def bed_diameter(deposit: Array, classes: SizeClasses) -> Array:
+    """Sauter diameter (...,) m of solids (..., C) m3; 0 where there are none."""
+    inverse = deposit @ (1.0 / classes.diameter)
+    return np.divide(deposit.sum(axis=-1), inverse, out=np.zeros_like(inverse), where=inverse > 0)
+
+
+def kept_shares(sieve: Sieve, solids: Deposits, classes: SizeClasses) -> Array:
+    """Share (T, 2) of its clean conductance that each side of a throat keeps.
+
+    Solids of the diameter d that take the share s of a pore of the size l add to each side
+
+        dR = s^2 max(A / (d l)^1.5, B / (d^2 l)).
+    """
+    loads = loads_of(sieve, solids, classes, with_attached=True)
+    size, room = np.maximum(loads.diameter, 1e-12), np.maximum(sieve.room, 1e-9)
+    share = np.minimum(loads.share, 1.0 - PACKED)
+    added = np.maximum(ADDED / (size * room) ** 1.5, BED / (size**2 * room)) * share**2
+    added = np.where(loads.diameter > 0, added, 0.0)
+    raised = sieve.halves + added[sieve.ends]
+    return np.divide(sieve.halves, raised, out=np.ones_like(raised), where=sieve.halves > 0)
+
+
+def bed_holds(size: Array, classes: SizeClasses) -> Array:
+    """Share (N, C) of each class that beds of the Sauter diameter `size` (N,) m hold."""
+    return np.where(size[:, None] > 0, wider_share(classes, TIGHT * size), 0.0)
+
+
+def full_share(fill: Array) -> Array:
+    """How far pores act as beds (N,): 0 up to a filled share of `FULL`, 1 from 1 on."""
+    return np.clip((fill - FULL) / (1.0 - FULL), 0.0, 1.0)
+
+
+# ------------------------------------------------------------------------------------------------
+# What each link holds back, and where that goes.
+
+
+LOADED = (0.06, 1.6, 0.33)
+"""Chance per arrival that a deposit beside a throat stops a fine: a + b s, at most c, of the share
+s that it takes of the two pores."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Holding:
+    """What links (K) and the face hold back in one step.
+
+    Attributes:
+        held: (K, C) share of each class that a link holds back.
+        stuck: (K, C) the part of it that sticks to grains, as a share of all.
+        admitted: (N, C) share of the mud's solids that enter a pore of the face.
+    """
+
+    held: Array
+    stuck: Array
+    admitted: Array
+
+    __repr__ = one_line
+
+
+def holding(
+    sieve: Sieve, solids: Deposits, classes: SizeClasses, streams: Streams, filtering: Array
+) -> Holding:
+    """What holds back what, with the deposit as it is; `filtering` (C,) 1/m is of clean grains."""
+    loads, throat = loads_of(sieve, solids, classes), streams.link
+    holds = bed_holds(loads.diameter, classes)
+    full = full_share(loads.filled)[:, None] * holds
+    one, other = streams.source, streams.target
+    void = np.maximum(sieve.void, 1e-30)
+    near = (loads.share * void)[one] + (loads.share * void)[other]
+    near /= void[one] + void[other]
+    start, slope, most = LOADED
+    chance = np.where(near > 0, np.minimum(start * (near > NONE) + slope * near, most), 0.0)
+    beside = chance[:, None] * np.maximum(holds[one], holds[other])
+    clean = np.maximum(sieve.passage[throat], 1e-12)
+    bridged = bridging_chance(classes.diameter / clean[:, None])
+    passing = (1.0 - wider_share(classes, clean)) * (1.0 - bridged) * (1.0 - beside)
+    passing *= 1.0 - full[other]
+    stuck = np.zeros_like(passing)
+    if np.any(filtering > 0):
+        bare = 1.0 - covered(solids.attached, classes, sieve.surface)[one]
+        stuck = -np.expm1(-filtering * (sieve.way[throat] * bare)[:, None])
+    held = 1.0 - (1.0 - stuck) * passing
+    return Holding(held=held, stuck=stuck, admitted=_admitted(sieve, solids, classes, full))
+
+
+NONE = 1e-3
+"""Share of two pores below which a deposit stops nothing: less than a fine in hundreds of them."""
+
+
+def _admitted(sieve: Sieve, solids: Deposits, classes: SizeClasses, full: Array) -> Array:
+    covers = min(1.0, cake_layers(sieve, solids, classes))
+    size = bed_diameter(solids.cake[None], classes)
+    return (1.0 - full) * (1.0 - covers * bed_holds(size, classes))
+
+
+def cake_layers(sieve: Sieve, solids: Deposits, classes: SizeClasses) -> float:
+    """Thickness of the cake in its own Sauter diameters."""
+    size = float(bed_diameter(solids.cake, classes))
+    return thickness_of_cake(sieve, solids) / size if size > 0 else 0.0
+
+
+def thickness_of_cake(sieve: Sieve, solids: Deposits) -> float:
+    """m, of the cake at the porosity `PACKED`."""
+    return float(solids.cake.sum()) / (1.0 - PACKED) / sieve.area
+
+
+def advanced(
+    sieve: Sieve,
+    solids: Deposits,
+    classes: SizeClasses,
+    streams: Streams,
+    what: Holding,
+    filtrate: float,
+) -> tuple[Swept, Deposits]:
+    """What the flow carried while `filtrate` m3 of fluid entered, and the solids after it.
+
+    `what` says what holds back. What was held goes to throats, pores and grains.
+    """
+    void = fluid_void(sieve, solids)
+    carried = carry(
+        streams,
+        filtrate,
+        void=void,
+        inside=solids.carried,
+        feed=classes.concentration * what.admitted,
+        holds=what.held,
+    )
+    count = len(sieve.void)
+    sticks = np.divide(what.stuck, what.held, out=np.zeros_like(what.held), where=what.held > 0)
+    stuck = carried.held * sticks
+    rest, room = carried.held - stuck, 1.0 - wedged(solids, classes)[streams.link]
+    in_pores, attached = solids.in_pores.copy(), solids.attached.copy()
+    in_throats, volume = solids.in_throats.copy(), classes.volume
+    passage = sieve.passage[streams.link]
+    for i in reversed(range(len(volume))):
+        fits = classes.diameter[i] <= WEDGES * passage
+        wedges = np.where(fits, np.minimum(rest[:, i], room * volume[i]), 0.0)
+        room = np.maximum(room - wedges / volume[i], 0.0)
+        in_throats[streams.link, i] += wedges
+        in_pores[:, i] += np.bincount(streams.source, rest[:, i] - wedges, count)
+        attached[:, i] += np.bincount(streams.source, stuck[:, i], count)
+    come = filtrate * streams.fed[:, None] * classes.concentration
+    after = replace(
+        solids,
+        carried=carried.concentration * void[:, None],
+        in_pores=in_pores,
+        attached=attached,
+        in_throats=in_throats,
+        cake=solids.cake + np.sum(come * (1.0 - what.admitted), axis=0),
+        passed=solids.passed + carried.passed,
+        supplied=solids.supplied + come.sum(axis=0),
+    )
+    return carried, after
+
+
+LEAST_VOID = 1e-3
+"""Share of its void that a pore keeps at least for fluid."""
+
+
+def fluid_void(sieve: Sieve, solids: Deposits) -> Array:
+    """Void (N,) m3 that the solids leave to the fluid."""
+    taken = (solids.in_pores + solids.attached).sum(axis=1)
+    least = LEAST_VOID * np.maximum(sieve.void, 1e-6 * sieve.void.mean())
+    return np.maximum(sieve.void - taken, least)

@@ -1,0 +1,280 @@
+"""The invasion of classes through time: flow, transport and deposit, step by step.
+
+Each step solves the flow with what the deposit left of the throats, carries all classes, and lets
+the deposit grow. The length of a step is that in which the resistance changes by `CHANGE`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fdnet.case.case import InvasionCase
+from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient
+from fdnet.classes.deposit import (
+    PACKED,
+    Deposits,
+    Sieve,
+    advanced,
+    bed_diameter,
+    holding,
+    kept_shares,
+    no_solids,
+    thickness_of_cake,
+)
+from fdnet.classes.transport import Streams, streams_of
+from fdnet.network.fines.occupancy import ratio
+from fdnet.network.flow.flow import Flow, solve_flow
+from fdnet.network.network import Network
+from fdnet.scales.flow import api_permeability, carman_kozeny
+from fdnet.scales.scales import InvasionScales
+from fdnet.spheres.snapshot import Array
+
+CHANGE = 0.05
+"""Relative change of the resistance of the pack in one step."""
+LEAST_STEP, FIRST_STEP = 1e-6, 0.02
+"""m3 of fluid over the pores of the specimen: in the shortest step, and in the first."""
+MOST_STEPS = 5000
+
+
+class PackState(NamedTuple):
+    """The flow through the pack as its deposit left it."""
+
+    streams: Streams
+    energy: Array
+    """(T,) share of each throat in the energy spent."""
+    k_over_k0: float
+    flow: Flow | None = None
+
+
+def flows_through(network: Network, sieve: Sieve, clean: Array) -> "PackStateOf":
+    """How the fluid flows through a network when the sides of its throats keep some of `clean`.
+
+    `clean` (T,) m3 are the conductances without solids. Raises FlowError as `solve_flow` does.
+    """
+    first = np.unique(network.pore_group, return_index=True)[1]
+    whole, intact = sieve.halves.sum(axis=1), solve_flow(network, clean).inflow
+
+    def state(kept: Array) -> PackState:
+        conductance = clean * ratio(whole, np.sum(sieve.halves / kept, axis=1))
+        flow = solve_flow(network, conductance)
+        streams = streams_of(
+            sieve.ends,
+            flow.throat_flux,
+            flow.pore_pressure[first],
+            inlet=sieve.inlet,
+            outlet=sieve.outlet,
+        )
+        spent = ratio(flow.throat_flux**2, conductance)
+        return PackState(
+            streams=streams,
+            energy=spent / max(float(spent.sum()), 1e-300),
+            k_over_k0=flow.inflow / intact if intact > 0 else 0.0,
+            flow=flow,
+        )
+
+    return state
+
+
+PackStateOf = Callable[[Array], PackState]
+"""The flow, from the share (T, 2) of its conductance that each side of a throat keeps."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Course:
+    """What drives an invasion and what ends it, SI units.
+
+    Attributes:
+        velocity: m/s, superficial, through the intact pack.
+        resistance: 1/m, of the intact pack.
+        rest: resistance of the way beyond it, over that.
+        at_rate: whether the velocity stays, and not the pressure.
+        cake_permeability: m2; None: by Carman and Kozeny of what is in it.
+        duration: s; None: until the stop rule holds.
+        plug_rate: share of the first supply that may enter while the face counts as plugged.
+        plug_time: s, for which that must hold.
+        cap_time: s, when the invasion ends at the latest.
+        supply: m3 of solids that come at most.
+        sticking: share of contacts with grains that stick.
+        bed: grains and fluid, for what sticks.
+    """
+
+    velocity: float
+    resistance: float
+    rest: float
+    at_rate: bool
+    cake_permeability: float | None
+    duration: float | None
+    plug_rate: float
+    plug_time: float
+    cap_time: float
+    supply: float
+    sticking: float
+    bed: Bed
+
+
+def bed_of(case: InvasionCase, scales: InvasionScales, velocity: float) -> Bed:
+    """The grains of a case as a bed, in a fluid of the superficial `velocity` m/s."""
+    return Bed(
+        diameter=case.grains.sauter_diameter_m,
+        porosity=scales.porosity,
+        velocity=velocity,
+        viscosity=case.fluid.viscosity_Pa_s,
+        density=case.fluid.density_kg_m3,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ClassInvasion:
+    """The end of an invasion and its history.
+
+    Attributes:
+        solids: where they are.
+        kept: (T, 2) share of its conductance that each side of a throat keeps.
+        rows: one a step: time, rate, filtrate, solids, cake.
+        by_class: (S, 3, C) m3 inside, passed and in the cake at each of these steps.
+        stop_reason: "plugged", "duration", "supply_exhausted" or "cap".
+        state: the flow at the end.
+    """
+
+    solids: Deposits
+    kept: Array
+    rows: tuple[Mapping[str, float], ...]
+    by_class: Array
+    stop_reason: str
+    state: PackState
+
+
+def velocity_in(course: Course, k_over_k0: float, cake: float) -> float:
+    """Superficial velocity, m/s, with a cake of resistance `cake` 1/m.
+
+    At constant pressure U = U0 (1 + rest) / (k0 / k + rest + cake / R0).
+    """
+    if course.at_rate:
+        return course.velocity
+    if k_over_k0 <= 0:
+        return 0.0
+    resistance = 1.0 / k_over_k0 + course.rest + cake / course.resistance
+    return course.velocity * (1.0 + course.rest) / resistance
+
+
+def cake_resistance(
+    given: float | None, sieve: Sieve, solids: Deposits, classes: SizeClasses
+) -> float:
+    """1/m, of the cake: its thickness over its permeability, `given` in m2 or that of its bed."""
+    thickness = thickness_of_cake(sieve, solids)
+    if thickness <= 0:
+        return 0.0
+    size = float(bed_diameter(solids.cake, classes))
+    return thickness / (given or carman_kozeny(PACKED, size))
+
+
+def invade_classes(
+    sieve: Sieve, classes: SizeClasses, course: Course, flow_with: PackStateOf
+) -> ClassInvasion:
+    """Let the mud in until the course ends."""
+    solids, pores = no_solids(sieve, classes), float(sieve.void.sum())
+    kept, rows, by_class, time, filtrate = np.ones(sieve.ends.shape), [], [], 0.0, 0.0
+    wanted, quiet, reason, mud = FIRST_STEP * pores, 0.0, "", float(classes.concentration.sum())
+    state = flow_with(kept)
+    for _ in range(MOST_STEPS):
+        cake = cake_resistance(course.cake_permeability, sieve, solids, classes)
+        velocity = velocity_in(course, state.k_over_k0, cake)
+        rows.append(_row(course, sieve, solids, time, filtrate, velocity, state.k_over_k0, cake))
+        by_class.append([solids.inside_by_class, solids.passed, solids.cake])
+        reason = reason or ("plugged" if velocity <= 0 else "")
+        if reason:
+            break
+        bed = replace(course.bed, velocity=velocity)
+        filtering = filter_coefficient(classes, bed, course.sticking)
+        what = holding(sieve, solids, classes, state.streams, filtering)
+        rate, bounds = velocity * sieve.area, []
+        bounds.append((course.supply - float(solids.supplied.sum())) / mud)
+        bounds.append(((course.duration or course.cap_time) - time) * rate)
+        if course.duration is None:
+            bounds.append(0.25 * course.plug_time * rate)
+        volume = min(wanted, *bounds)
+        while True:
+            _, after = advanced(sieve, solids, classes, state.streams, what, volume)
+            new = kept_shares(sieve, after, classes)
+            change = _change(sieve, state.energy, kept, new)
+            if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
+                break
+            volume *= max(0.2, CHANGE / change)
+        wanted = volume * min(max(CHANGE / max(change, 1e-9), 0.3), 2.0)
+        come = volume * float(np.sum(state.streams.fed[:, None] * classes.concentration))
+        entered = come - float(np.sum(after.cake - solids.cake))
+        time, filtrate = time + volume / rate, filtrate + volume
+        crossing = entered / (mud * volume) * velocity / course.velocity
+        quiet = quiet + volume / rate if crossing <= course.plug_rate else 0.0
+        solids, kept = after, new
+        state = flow_with(kept)
+        reason = _ended(course, time, quiet, float(solids.supplied.sum()))
+    return ClassInvasion(
+        solids=solids,
+        kept=kept,
+        rows=tuple(rows),
+        by_class=np.array(by_class),
+        stop_reason=reason or "cap",
+        state=state,
+    )
+
+
+def _change(sieve: Sieve, energy: Array, before: Array, after: Array) -> float:
+    """Relative change of the resistance of the pack, by the energy that each throat spends."""
+    old, new = (np.sum(sieve.halves / kept, axis=1) for kept in (before, after))
+    grown = np.divide(new, old, out=np.ones_like(old), where=old > 0)
+    return float(np.sum(energy * np.abs(1.0 - 1.0 / np.maximum(grown, 1e-12))))
+
+
+def _ended(course: Course, time: float, quiet: float, supplied: float) -> str:
+    """Why the invasion ends now; "" where it goes on."""
+    near = 1.0 - 1e-9
+    if course.duration is not None:
+        return "duration" if time >= near * course.duration else ""
+    if quiet >= near * course.plug_time:
+        return "plugged"
+    if supplied >= near * course.supply:
+        return "supply_exhausted"
+    return "cap" if time >= near * course.cap_time else ""
+
+
+def _row(
+    course: Course,
+    sieve: Sieve,
+    solids: Deposits,
+    time: float,
+    filtrate: float,
+    velocity: float,
+    k_over_k0: float,
+    cake: float,
+) -> dict[str, float]:
+    inside = float(solids.inside_by_class.sum())
+    viscosity = course.bed.viscosity
+    return {
+        "time_s": time,
+        "rate_m3_s": velocity * sieve.area,
+        "rate_over_initial": velocity / course.velocity,
+        "k_over_k0": k_over_k0,
+        "filtrate_m3": filtrate,
+        "supplied_m3": float(solids.supplied.sum()),
+        "invaded_m3": inside,
+        "passed_m3": float(solids.passed.sum()),
+        "cake_m3": float(solids.cake.sum()),
+        "cake_thickness_m": thickness_of_cake(sieve, solids),
+        "pressure_cake_Pa": viscosity * velocity * cake,
+        "pressure_pack_Pa": viscosity * velocity * course.resistance / max(k_over_k0, 1e-300),
+    }
+
+
+def cake_permeability(case: InvasionCase) -> float | None:
+    """Permeability, m2, of the cake that the case gives, or its API filtrate; None without."""
+    if case.cake is None or case.cake.api_filtrate_m3 is None:
+        return None if case.cake is None else case.cake.permeability_m2
+    return api_permeability(
+        case.cake.api_filtrate_m3,
+        viscosity=case.fluid.viscosity_Pa_s,
+        solids=case.fines.volume_fraction,
+        porosity=PACKED,
+    )

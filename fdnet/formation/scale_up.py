@@ -1,0 +1,380 @@
+"""A core and a well by the model, from what a specimen hands up, with bands."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fdnet.errors import CaseError
+from fdnet.files import write_text
+from fdnet.formation.handed_up import HandedUp, draw_fit, hand_up
+from fdnet.formation.model import (
+    NO_RELEASE,
+    CakeOf,
+    Column,
+    Flood,
+    March,
+    cake_skin,
+    damage_skin,
+    march,
+    steep_grid,
+)
+from fdnet.report.html import FORMATION, formation_html, put_section
+from fdnet.report.tables import plain_json
+from fdnet.run.answer import DAMAGED_FROM, flow_lost, hawkins
+from fdnet.run.finished import FinishedRun
+from fdnet.run.folder import locked
+from fdnet.scales.flow import USUAL_WELL, api_permeability
+from fdnet.spheres.snapshot import Array
+from fdnet.statistics.bands import student_band
+
+CELLS, MOMENTS = 120, 21
+DEPTHS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2)
+"""Depths, m, at which a well gives k / k0."""
+SHOTS, SHOT_LENGTH, SHOT_RADIUS = 13.0, 0.3, 0.005
+"""Perforations: number a metre (4 a foot), length and radius, m."""
+
+
+def core_flood(
+    source: str | Path | FinishedRun,
+    *,
+    length: float,
+    diameter: float = 0.038,
+    rate: float | None = None,
+    pressure: float | None = None,
+    minutes: float = 30.0,
+    back_flow: float = 10.0,
+    sections: int = 4,
+    **mud: Any,
+) -> dict[str, Any]:
+    """A core of the specimen's sand flooded with its mud; then the flow is turned back.
+
+    Args:
+        source: a run, its folder, or the folder of an ensemble.
+        length, diameter: m.
+        rate, pressure: m3/s, or Pa over the core and its cake; one of them.
+        minutes: of the flood.
+        back_flow: pore volumes that flow back, where the run had a clean-up.
+        sections: equal ones, between pressure taps.
+        mud: `cake_permeability` m2, or `api_filtrate` m3 that it follows from; `classes` of size.
+
+    Returns:
+        Numbers in SI, with their 95 % bands as `_low` and `_high`: `k_over_k0`, `filtrate_m3`,
+        `effluent_over_c0`, `return_k_over_k0` (None without a clean-up) and others; `sections`,
+        `history`, `handed_up`, `warnings`, and `words`.
+
+    Raises:
+        CaseError: an argument is not above 0, or the specimen cannot tell.
+
+    Examples:
+        >>> import fdnet
+        >>> core = fdnet.core_flood("runs/quick", length=0.076, rate=1.7e-8)
+        >>> 0 < core["k_over_k0"] < 1
+        True
+    """
+    if (rate is None) == (pressure is None):
+        raise CaseError("a core takes a rate or a pressure; give one of --rate and --pressure")
+    _above_zero(length=length, diameter=diameter, minutes=minutes, sections=sections)
+    _above_zero(rate=rate, pressure=pressure, back_flow=back_flow)
+    area, taps = math.pi * diameter**2 / 4, np.linspace(0.0, length, sections + 1)
+    drive = Flood(60 * minutes, pressure or math.nan, rate)
+
+    def flooded(handed: HandedUp) -> dict[str, Any]:
+        first = 0.01 / (_steepest(handed) + 1 / length)
+        column = Column(edges=steep_grid(length, CELLS, first), area=area)
+        made = _marched(handed, column, [drive], taps)
+        tap, kept, back = np.cumsum(made.parts[-1, ::-1])[::-1], made.k_over_k0[-1], None
+        if handed.release:
+            flow = abs(float(made.rate[0]))
+            seconds = back_flow * handed.rock.porosity * area * length / flow
+            forth = drive._replace(seconds=float(made.time[-1]))
+            back = _marched(handed, column, [forth, Flood(seconds, rate=-flow)], taps).k_over_k0[
+                -1
+            ]
+        solids = sum(one.concentration for one in handed.mud)
+        curves = {
+            "filtrate_m3": made.filtrate,
+            "rate_m3_s": made.rate,
+            "pressure_Pa": made.pressure,
+            "effluent_over_c0": made.effluent.sum(axis=1) / solids,
+        }
+        moments = np.linspace(0.0, drive.seconds, MOMENTS)
+        return _common(handed, column, made) | {
+            "k_over_k0": float(sections / np.sum(1 / kept)),
+            "return_k_over_k0": None if back is None else float(sections / np.sum(1 / back)),
+            **{name: float(curve[-1]) for name, curve in curves.items()},
+            "pressure_cake_Pa": float(made.parts[-1, 0]),
+            "sections": [
+                {
+                    "x_lo_m": float(taps[n]),
+                    "x_hi_m": float(taps[n + 1]),
+                    "pressure_Pa": float(tap[n + 1]),
+                    "k_over_k0": float(kept[n]),
+                    "return_k_over_k0": None if back is None else float(back[n]),
+                }
+                for n in range(sections)
+            ],
+            "history": [
+                {"time_s": float(moment)}
+                | {name: float(np.interp(moment, made.time, c)) for name, c in curves.items()}
+                for moment in moments
+                if moment <= made.time[-1]
+            ],
+        }
+
+    found = _banded(source, flooded, **mud)
+    face, words = found["sections"][0], []
+    words.append(f"A core of {1e3 * length:g} mm keeps {with_band(found, 'k_over_k0')} of its k0.")
+    words.append(f"Its first {1e3 * taps[1]:.3g} mm keep {with_band(face, 'k_over_k0')}.")
+    if face["return_k_over_k0"] is not None:
+        words.append(
+            f"After a back-flow of {back_flow:g} pore volumes they are "
+            f"{with_band(found, 'return_k_over_k0')} and {with_band(face, 'return_k_over_k0')}."
+        )
+    return found | {"words": words}
+
+
+def well_invasion(
+    source: str | Path | FinishedRun,
+    *,
+    hours: float = 12.0,
+    height: float = 1.0,
+    pressure: float | None = None,
+    radius: float | None = None,
+    **mud: Any,
+) -> dict[str, Any]:
+    """A well drilled through the specimen's sand with its mud, open hole and perforated.
+
+    Args:
+        source: a run, its folder, or the folder of an ensemble.
+        hours: that the mud stands.
+        height: m, of the well.
+        pressure: Pa, overbalance; that of the case where it is not given.
+        radius: m, of the well; that of the case, or 108 mm.
+        mud: as of `core_flood`.
+
+    Returns:
+        Numbers in SI, with their 95 % bands as `_low` and `_high`: `filtrate_m3`,
+        `invasion_radius_m`, `skin` of the damage (integrated) and `skin_hawkins`, `flow_lost`
+        (share of the productivity), `skin_cake` while the cake stands, the same `perforated`,
+        `k_over_k0` by depth; `handed_up`, `warnings` and `words`.
+
+    Raises:
+        CaseError: an argument is not above 0, or the specimen cannot tell.
+
+    Examples:
+        >>> import fdnet
+        >>> fdnet.well_invasion("runs/quick", hours=12)["skin"] > 0
+        True
+    """
+    _above_zero(hours=hours, height=height, pressure=pressure, radius=radius)
+
+    def drilled(handed: HandedUp) -> dict[str, Any]:
+        case: Any = handed.run.case
+        usual, outer = USUAL_WELL
+        if case.well is not None:
+            usual, outer = case.well.radius_m, case.well.drainage_radius_m
+        well, over = radius or usual, pressure or case.fluid.overbalance_Pa
+        if well >= outer:
+            raise CaseError(f"radius: {well:g} m, expected below the drainage radius, {outer:g} m")
+        if not over:
+            raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
+        drive = Flood(3600 * hours, over)
+        hole, made = _around(handed, well, height, outer, drive)
+        shots = SHOTS * SHOT_LENGTH
+        shot, pierced = _around(handed, SHOT_RADIUS, height * shots, outer, drive)
+        loss = handed.rock.loss(made.end.deposit)
+        skin = damage_skin(hole, loss)
+        of_shot = damage_skin(shot, handed.rock.loss(pierced.end.deposit)) / shots
+        bad = np.flatnonzero(1 / loss <= 1 - DAMAGED_FROM)
+        zone = float(hole.edges[bad[-1] + 1]) if len(bad) else 0.0
+        rings = np.diff(hole.reach(hole.edges))[: bad[-1] + 1 if len(bad) else 0]
+        ratio = float(rings.sum() / (rings @ loss[: len(rings)])) if len(bad) else 1.0
+        found = _common(handed, hole, made)
+        pores, middle = (
+            math.pi * handed.rock.porosity * height,
+            (hole.edges[:-1] + hole.edges[1:]) / 2,
+        )
+        if handed.cake:
+            cake = cake_skin("inward", found["cake_thickness_m"], well)
+            found["skin_cake"] = cake * handed.rock.permeability / handed.cake.permeability
+        return found | {
+            "filtrate_m3": float(made.filtrate[-1]),
+            "invasion_radius_m": math.sqrt(well**2 + float(made.filtrate[-1]) / pores),
+            "skin": skin,
+            "skin_hawkins": hawkins(ratio, well=well, damaged=well + zone),
+            "damaged_depth_m": zone,
+            "flow_lost": flow_lost(skin, well=well, drainage=outer),
+            "perforated": {
+                "skin": of_shot,
+                "flow_lost": flow_lost(of_shot, well=well, drainage=outer),
+            },
+            "k_over_k0": [
+                {"depth_m": x, "k_over_k0": float(np.interp(x, middle, 1 / loss, right=1.0))}
+                for x in DEPTHS
+            ],
+        }
+
+    found = _banded(source, drilled, shape="inward", **mud)
+    shot = found["perforated"]
+    words = [
+        f"The damage is a skin of {with_band(found, 'skin')} and costs an open hole "
+        f"{with_band(found, 'flow_lost')} of its productivity.",
+        f"It matters where the flow has less room: perforations that met this mud ({SHOTS:g} a "
+        f"metre, {1e3 * SHOT_LENGTH:g} mm long, {1e3 * SHOT_RADIUS:g} mm radius) have a skin of "
+        f"{with_band(shot, 'skin')} and lose {with_band(shot, 'flow_lost')}.",
+        f"In {found['time_s'] / 3600:.3g} h {with_band(found, 'filtrate_m3')} m3 of filtrate "
+        f"reach a radius of {with_band(found, 'invasion_radius_m')} m.",
+    ]
+    return found | {"words": words}
+
+
+def keep(folder: Path, name: str, found: Mapping[str, Any], given: Mapping[str, Any]) -> None:
+    """Keep the numbers and the fit in `formation` below the folder, and in its report."""
+    out, report = folder / FORMATION, folder / "report.html"
+    with locked(folder):
+        out.mkdir(exist_ok=True)
+        write_text(out / f"{name}.json", plain_json({"given": given, **found})[1] + "\n")
+        draw_fit(hand_up(folder, classes=given.get("classes", 1)), out / "handed_up.svg")
+        if report.is_file():
+            put_section(report, FORMATION, formation_html(out))
+
+
+def _around(
+    handed: HandedUp, well: float, height: float, outer: float, drive: Flood
+) -> tuple[Column, March]:
+    """The rock around a hole of radius `well` m as deep as fines get, and the mud in it."""
+    slowest = min((one.rate for one in handed.mud if one.rate > 0), default=1.0)
+    length, first = min(outer - well, 20 / slowest), 0.01 / (_steepest(handed) + 1)
+    column = Column(
+        edges=steep_grid(length, CELLS, first),
+        area=2 * math.pi * well * height,
+        well=well,
+        outer=outer - well,
+    )
+    return column, _marched(handed, column, [drive], None)
+
+
+def _steepest(handed: HandedUp) -> float:
+    """Rate of filtration at the face when it closes, 1/m."""
+    return max(one.rate * (1 + max(one.growth, 0.0) * handed.closing) for one in handed.mud)
+
+
+def _marched(
+    handed: HandedUp, column: Column, drives: Sequence[Flood], taps: Array | None
+) -> March:
+    viscosity = handed.run.case.fluid.viscosity_Pa_s
+    return march(
+        column,
+        handed.rock,
+        handed.mud,
+        drives,
+        viscosity,
+        cake=handed.cake,
+        closing=handed.closing,
+        release=handed.release or NO_RELEASE,
+        taps=taps,
+    )
+
+
+_STOPPED = {
+    "": "",
+    "closed": "the numbers are those of the time when the face had the deposit of the run's end, "
+    "for no cake is known; give --cake-permeability or --api-filtrate",
+    "full": "the cake of these fines alone fills the hole: the numbers are those of that time. "
+    "A mud that has finer solids too holds back its filtrate; give --api-filtrate",
+}
+
+
+def _common(handed: HandedUp, column: Column, made: March) -> dict[str, Any]:
+    cake = handed.cake
+    thick = made.end.cake.sum() / ((1 - cake.porosity) * column.area) if cake else 0.0
+    return {
+        "time_s": float(made.time[-1]),
+        "closed_at_s": made.closed_at,
+        "cake_thickness_m": float(thick),
+        "deposit_m3": float(made.end.deposit.sum(axis=0) @ column.volume),
+        "stopped": _STOPPED[made.stopped],
+    }
+
+
+def _banded(
+    source: str | Path | FinishedRun,
+    by_model: Callable[[HandedUp], dict[str, Any]],
+    *,
+    classes: int = 1,
+    shape: str = "linear",
+    cake_permeability: float | None = None,
+    api_filtrate: float | None = None,
+) -> dict[str, Any]:
+    """What the model gives for all that is handed up, with bands: of seeds, or of the fits."""
+    _above_zero(cake_permeability=cake_permeability, api_filtrate=api_filtrate)
+    many = [
+        replace(one, cake=_cake_of(one, shape, cake_permeability, api_filtrate))
+        for one in hand_up(source, classes=classes)
+    ]
+    seeds = len({one.run.path for one in many})
+    found = _merged([by_model(one) | {"handed_up": one.values()} for one in many], seeds)
+    notes = dict.fromkeys(note for one in many for note in one.notes)
+    if stopped := found.pop("stopped"):
+        notes[stopped] = None
+    return found | {"seeds": seeds, "warnings": list(notes)}
+
+
+def _cake_of(
+    handed: HandedUp, shape: str, permeability: float | None, api_filtrate: float | None
+) -> CakeOf | None:
+    """The cake of the run, or that which is given, by its permeability or its API filtrate."""
+    porosity = handed.cake.porosity if handed.cake else 0.5
+    if permeability is None and api_filtrate is None:
+        return handed.cake and replace(handed.cake, shape=shape)
+    if permeability is None:
+        permeability = api_permeability(
+            api_filtrate or 0.0,
+            viscosity=handed.run.case.fluid.viscosity_Pa_s,
+            solids=sum(one.concentration for one in handed.mud),
+            porosity=porosity,
+        )
+    return CakeOf(porosity=porosity, permeability=permeability, shape=shape)
+
+
+def _merged(trees: Sequence[Any], seeds: int) -> Any:
+    """The first of the trees, a number that differs between them with its band.
+
+    The first is that of a single run, and the mean takes its place where there are several.
+    """
+    first = trees[0]
+    if isinstance(first, list):
+        return [_merged(row, seeds) for row in zip(*trees, strict=False)]
+    if not isinstance(first, Mapping):
+        return first
+    result: dict[str, Any] = {}
+    for key, value in first.items():
+        values = [tree[key] for tree in trees if key in tree]
+        if not isinstance(value, float) or None in values or np.allclose(values, value, 1e-9, 0):
+            result[key] = _merged(values, seeds)
+            continue
+        low, high = np.percentile(values, (2.5, 97.5)).tolist()
+        if seeds > 1:
+            band = student_band(values)
+            value, low, high = band.mean, band.low, band.high
+        result |= {key: value, f"{key}_low": low, f"{key}_high": high}
+    return result
+
+
+def with_band(row: Mapping[str, Any], key: str) -> str:
+    """The number of a row with its band; a share in percent."""
+    share = key.endswith(("_over_k0", "_lost"))
+    values = [row[key], row.get(f"{key}_low"), row.get(f"{key}_high")]
+    one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.3g}" for v in values)
+    unit = " %" if share else ""
+    return f"{one}{unit}" if None in band else f"{one}{unit} ({band[0]} to {band[1]}{unit})"
+
+
+def _above_zero(**given: float | None) -> None:
+    for name, value in given.items():
+        if value is not None and not 0 < value < math.inf:
+            raise CaseError(f"{name}: {value:g}, expected a number above 0")

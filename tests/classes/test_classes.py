@@ -1,0 +1,226 @@
+"""Size classes on a pore network: exact solutions, balances, and what must not matter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fdnet.case.spheres import Fines
+from fdnet.classes.capture import (
+    Bed,
+    SizeClasses,
+    collector_efficiency,
+    mud_classes,
+    wider_share,
+)
+from fdnet.classes.deposit import Sieve, advanced, holding, no_solids, sieve_of
+from fdnet.classes.invasion import Course, flows_through, invade_classes
+from fdnet.classes.transport import carry, streams_of
+from fdnet.network.flow.flow import solve_flow
+from fdnet.network.laws.deposit_resistances import grain_resistances
+from fdnet.network.network import build_network
+from tests.network.packs import random_pack
+
+BED = Bed(diameter=0.5e-3, porosity=0.4, velocity=1.4e-4, viscosity=1e-3, density=998.0)
+
+
+def sizes(*diameters, concentration=0.02):
+    d = np.array(diameters, float)
+    return SizeClasses(
+        low=d,
+        high=d,
+        diameter=d,
+        concentration=np.full(len(d), concentration / len(d)),
+        density=np.full(len(d), 2650.0),
+    )
+
+
+def chain(count, *, step=1.0, void=1e-3, surface=1.0, passage=1.0):
+    """Pores in a row; the first lies on the face and the last on the outlet."""
+    place = np.column_stack([step * np.arange(count), np.zeros(count), np.zeros(count)])
+    ends = np.column_stack([np.arange(count - 1), np.arange(1, count)])
+    number = np.arange(count)
+    return Sieve(
+        ends=ends,
+        passage=np.full(count - 1, passage),
+        opening=np.full(count - 1, 0.5 * passage),
+        halves=np.ones((count - 1, 2)),
+        way=np.full(count - 1, step),
+        void=np.full(count, void),
+        room=np.full(count, np.cbrt(void)),
+        surface=np.full(count, surface),
+        place=place,
+        throat_place=0.5 * (place[1:] + place[:-1]),
+        inlet=number == 0,
+        outlet=number == count - 1,
+        area=1.0,
+        length=step * (count - 1),
+    )
+
+
+def through(sieve):
+    count = len(sieve.void)
+    return streams_of(
+        sieve.ends,
+        np.ones(count - 1),
+        np.linspace(1, 0, count),
+        inlet=sieve.inlet,
+        outlet=sieve.outlet,
+    )
+
+
+def step(sieve, solids, classes, streams, filtering, filtrate):
+    what = holding(sieve, solids, classes, streams, filtering)
+    return advanced(sieve, solids, classes, streams, what, filtrate)
+
+
+def test_one_rate_in_a_chain_falls_exponentially():
+    """c = c0 exp(-lambda x) (Iwasaki 1937) once the fluid of the chain is renewed."""
+    sieve, classes = chain(40, void=1e-12), sizes(1e-6)
+    carried, _ = step(
+        sieve, no_solids(sieve, classes), classes, through(sieve), np.array([0.11]), 1.0
+    )
+    expected = classes.concentration * np.exp(-0.11 * sieve.place[:-1, 0])
+    assert carried.concentration[:-1, 0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_surface_that_fills_up_gives_the_solution_of_bohart_and_adams():
+    """c/c0 = e^T / (e^X + e^T - 1): Langmuir's blocking, X = lambda x, T = lambda c0 V / s."""
+    count, rate = 400, 4.0
+    sieve = chain(count, step=1.0 / count, void=1e-5)
+    classes = sizes(1e-6, concentration=1e-4)
+    solids, streams = no_solids(sieve, classes), through(sieve)
+    most = 0.546 * 1.0 / (1.5 / 1e-6) * count  # solids that cover the surface of a unit of length
+    for turn in range(1, 401):
+        volume = 0.01 * most / (rate * classes.concentration[0])
+        carried, solids = step(sieve, solids, classes, streams, np.array([rate]), volume)
+        if turn % 100 == 0:
+            x, t = rate * sieve.place[:-1, 0], 0.01 * turn
+            expected = np.exp(t) / (np.exp(x) + np.exp(t) - 1.0)
+            got = carried.concentration[:-1, 0] / classes.concentration
+            assert got == pytest.approx(expected, abs=0.01)
+
+
+def test_one_sweep_solves_the_balance_of_every_pore():
+    """The same system, assembled and solved by elimination."""
+    rng, count = np.random.default_rng(3), 30
+    pressure = rng.random(count)
+    ends = np.array([(a, b) for a in range(count) for b in range(a) if rng.random() < 0.3])
+    flux = pressure[ends[:, 0]] - pressure[ends[:, 1]]
+    inlet, outlet = pressure > 0.8, pressure < 0.15
+    streams = streams_of(ends, flux, pressure, inlet=inlet, outlet=outlet)
+    void, inside = rng.random(count), rng.random((count, 2))
+    feed, holds = rng.random((count, 2)), rng.random((len(streams.link), 2))
+    got = carry(streams, 0.7, void=void, inside=inside, feed=feed, holds=holds)
+    for i in range(2):
+        matrix, source = np.diag(void), inside[:, i] + 0.7 * streams.fed * feed[:, i]
+        for k in range(len(streams.link)):
+            a, b, w = streams.source[k], streams.target[k], 0.7 * streams.share[k]
+            matrix[a, a] += w
+            matrix[b, a] -= w * (1.0 - holds[k, i])
+        expected = np.linalg.solve(matrix, source)
+        assert got.concentration[~outlet, i] == pytest.approx(expected[~outlet], rel=1e-12)
+        fed = float(np.sum(0.7 * streams.fed * feed[:, i])) + inside[~outlet, i].sum()
+        kept = float(void[~outlet] @ got.concentration[~outlet, i])
+        assert kept + got.held[:, i].sum() + got.passed[i] == pytest.approx(fed, rel=1e-13)
+
+
+def test_contact_efficiency_of_a_colloid():
+    """1 um in sand of 0.5 mm: Tufenkji and Elimelech 2004, by hand."""
+    eta = collector_efficiency(np.array([1e-6]), np.array([1050.0]), BED)
+    assert eta == pytest.approx([3.05e-3], rel=0.005)
+
+
+def test_a_class_is_strained_by_the_share_that_is_too_wide():
+    classes = replace(sizes(1.0), low=np.array([1.0]), high=np.array([4.0]))
+    assert wider_share(classes, np.array([0.5, 1.0, 2.0, 4.0, 9.0]))[:, 0] == pytest.approx(
+        [1.0, 1.0, 0.5, 0.0, 0.0], abs=1e-12
+    )
+
+
+def test_classes_hold_all_solids_of_the_mud():
+    """Also what the cut of the case leaves out, and the tails of its curve."""
+    fines = Fines.model_validate(
+        {"sizes": {"D10_mm": 0.005, "D50_mm": 0.025, "D90_mm": 0.07}, "cut_um": 40.0}
+    )
+    classes = mud_classes(fines, 8)
+    assert classes.concentration.sum() == pytest.approx(0.10, rel=1e-12)
+    assert len(classes.low) == 8
+    assert classes.low[0] < 5e-6
+    assert np.all((classes.low <= classes.diameter) & (classes.diameter <= classes.high))
+    one = mud_classes(Fines.model_validate({"radius_mm": 0.05}), 8)
+    assert one.diameter == pytest.approx([1e-4])
+
+
+# ------------------------------------------------------------------------------------------------
+# On the network of a random pack.
+
+
+def pack(order=None):
+    grains = random_pack(60, aspect=1.5)
+    if order is not None:
+        grains = grains.where(order)
+    network = build_network(grains, periodic="yz")
+    halves = grain_resistances(network)
+    clean = 1.0 / halves.sum(axis=1)
+    sieve = sieve_of(network, halves, solve_flow(network, clean).throat_flux)
+    return sieve, flows_through(network, sieve, clean)
+
+
+def course(sieve, **keys):
+    given = {
+        "velocity": 1e-3,
+        "resistance": 1e3,
+        "rest": 0.0,
+        "at_rate": False,
+        "cake_permeability": None,
+        "duration": None,
+        "plug_rate": 0.05,
+        "plug_time": 200.0,
+        "cap_time": 1e6,
+        "supply": 0.5 * float(sieve.void.sum()),
+        "sticking": 0.0,
+        "bed": BED,
+    }
+    return Course(**given | keys)
+
+
+def test_mass_of_every_class_is_found_again_and_none_falls_below_zero():
+    sieve, flow = pack()
+    end = invade_classes(sieve, sizes(0.05, 0.2, 0.5), course(sieve), flow)
+    assert np.abs(end.solids.missing).max() < 1e-12
+    assert end.solids.supplied.min() > 0
+    for one in (*end.solids.inside, end.solids.cake, end.solids.passed):
+        assert one.min() >= 0.0
+
+
+def test_the_numbers_of_the_grains_do_not_matter():
+    sieve, flow = pack()
+    other, flow_there = pack(np.random.default_rng(5).permutation(60))
+    first, second = (
+        invade_classes(one, sizes(0.2, 0.5), course(one, supply=20.0), way)
+        for one, way in ((sieve, flow), (other, flow_there))
+    )
+    for name in ("cake", "passed", "supplied"):
+        assert getattr(first.solids, name) == pytest.approx(
+            getattr(second.solids, name), rel=1e-6, abs=1e-9
+        )
+    assert first.rows[-1]["k_over_k0"] == pytest.approx(second.rows[-1]["k_over_k0"], rel=1e-6)
+
+
+def test_what_strains_and_sticks_nowhere_leaves_the_permeability():
+    sieve, flow = pack()
+    end = invade_classes(sieve, sizes(1e-4), course(sieve), flow)
+    assert end.rows[-1]["k_over_k0"] == pytest.approx(1.0, abs=1e-9)
+    assert end.stop_reason == "supply_exhausted"
+    assert end.solids.passed[0] > 0.3 * end.solids.supplied[0]
+
+
+def test_a_class_wider_than_every_throat_stays_at_the_face():
+    """It fills the pores of the face and then makes a cake, which plugs it."""
+    sieve, flow = pack()
+    widest = sizes(1.001 * float(sieve.passage.max()))
+    end = invade_classes(sieve, widest, course(sieve, supply=1e3), flow)
+    assert end.stop_reason == "plugged"
+    assert end.solids.cake[0] > 0
+    assert not np.any(end.solids.in_pores[~sieve.inlet])

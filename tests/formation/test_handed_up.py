@@ -1,0 +1,236 @@
+"""What a specimen hands up, and what the commands make of it."""
+
+import json
+import shutil
+from contextlib import suppress
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from fdnet.cli import main
+from fdnet.errors import CaseError
+from fdnet.formation import handed_up
+from fdnet.formation.handed_up import fit_damage, fit_depths, hand_up
+from fdnet.formation.model import CakeOf, Column, Flood, march, steep_grid
+from fdnet.formation.scale_up import _merged, core_flood, well_invasion
+from fdnet.run.finished import FinishedRun
+from fdnet.scales.flow import API_AREA
+
+
+@pytest.fixture(autouse=True)
+def _few_draws(monkeypatch):
+    monkeypatch.setattr(handed_up, "DRAWS", 8)
+
+
+RATE, G, LENGTH = 900.0, 1.5, 0.004
+
+
+def depths(count, seed, g=G):
+    """Depths m of fines, drawn by the law of the module, and how many passed `LENGTH`."""
+    deeper = np.random.default_rng(seed).uniform(size=count)
+    start = -np.expm1(-g)
+    x = -np.log(-np.expm1(-g * deeper) / start) / RATE
+    return x[x < LENGTH], int(np.sum(x >= LENGTH))
+
+
+def test_the_filtration_of_drawn_fines_comes_back_within_its_errors():
+    found = []
+    for seed in range(60):
+        x, passed = depths(150, seed)
+        fit = fit_depths(x, np.full(len(x), 2e-15), 2e-15 * passed, LENGTH)
+        error = fit.values - [np.log(RATE), G]
+        found.append(error @ np.linalg.inv(fit.covariance) @ error)
+        assert fit.misfit < 0.12
+    assert 1.2 < np.mean(found) < 3.2  # chi-square of two
+    assert np.mean(np.array(found) < 5.99) > 0.88
+
+
+def test_a_constant_filtration_is_the_censored_mean():
+    """rate = fines inside / (sum of depths + passed length): exact where growth is 0."""
+    x, passed = depths(4000, 3, g=1e-9)
+    fit = fit_depths(x, np.full(len(x), 1e-15), 1e-15 * passed, LENGTH)
+    exact = len(x) / (x.sum() + passed * LENGTH)
+    assert passed > 50
+    assert abs(fit.values[1]) < 3 * np.sqrt(fit.covariance[1, 1])
+    assert np.exp(fit.values[0]) == pytest.approx(exact, rel=0.1)
+
+
+def test_the_damage_of_made_sections_comes_back():
+    deposit = 0.2 * np.exp(-np.linspace(0, 5, 40))
+    share = np.repeat(np.eye(4), 10, axis=1) / 10
+    kept = 1 / (share @ (1 + 14.0 * deposit) ** 2)
+    value, error = fit_damage(kept, deposit, share)
+    assert np.exp(value) == pytest.approx(14.0, rel=1e-4)
+    assert error < 1e-4
+    assert fit_damage(kept * [1.1, 0.9, 1.1, 0.9], deposit, share)[1] > 0.01
+
+
+def test_the_model_gives_a_specimen_its_own_profile_and_permeability_back(finished):
+    """The key test: handed up from grains, run on the specimen's own length.
+
+    Clean fluid follows through a cake, so that all comes to rest. The shares by depth are those of
+    the grains within what the fit itself is apart from them.
+    """
+    many, length = hand_up(finished), finished.case.size_m[0]
+    area, cake = float(np.prod(finished.case.size_m[1:])), CakeOf(porosity=0.4, permeability=1e-11)
+    edges = np.append(many[0].sections[:, 0], length)
+    column = Column(edges=steep_grid(length, 150, length / 2000), area=area)
+    fines, kept = [], []
+    for one in many:
+        more = {"closing": one.closing, "cake": cake, "taps": edges}
+        made = march(column, one.rock, one.mud, [Flood(100.0, rate=area * 1e-3)], 1e-3, **more)
+        whole = np.append(0.0, np.cumsum(made.end.deposit.sum(axis=0) * column.volume))
+        fines.append(np.diff(np.interp(edges, column.edges, whole)))
+        kept.append(made.k_over_k0[-1])
+    number = np.array(fines) / (4 / 3 * np.pi * float(finished.spheres().fines().radius[0]) ** 3)
+    measured = np.cumsum(finished.sections["fines_count"])
+    x = np.sort(finished.spheres().fines().position[:, 0])
+    allowed = fit_depths(x[x >= 0], np.ones(np.sum(x >= 0)), 0, length).misfit + 0.02
+    assert np.cumsum(number[0]) / measured.iloc[-1] == pytest.approx(
+        measured.to_numpy() / measured.iloc[-1], abs=allowed
+    )
+    assert number[0].sum() == pytest.approx(measured.iloc[-1], rel=0.01)
+    assert number[1:].sum(axis=1).std() / measured.iloc[-1] == pytest.approx(298**-0.5, rel=0.6)
+    # each section within the scatter that a form with one number leaves
+    assert np.log(kept[0]) == pytest.approx(np.log(many[0].kept), abs=0.25)
+    assert kept[0][0] == pytest.approx(many[0].kept[0], abs=0.05)
+
+
+def changed(run, spheres=lambda one: one, **summary):
+    """The run with other spheres and other numbers in its summary."""
+
+    class Changed(FinishedRun):
+        def spheres(self, state="damaged"):
+            return spheres(run.spheres(state))
+
+    made = Changed(**{one.name: getattr(run, one.name) for one in fields(FinishedRun)})
+    made.__dict__["summary"] = {**run.summary, **summary}
+    return made
+
+
+def shifted(metres):
+    """Moves the fines along x."""
+    fine = {
+        "spheres": lambda one: replace(
+            one, position=one.position + np.outer(one.kind != one.kind.min(), [metres, 0, 0])
+        )
+    }
+    return fine
+
+
+def test_a_specimen_that_cannot_tell_says_why(finished):
+    passed = changed(finished, **shifted(1.0), passed_count=298)
+    with pytest.raises(
+        CaseError, match=r"all 298 fines passed 3 mm, none was filtered: .* below 3"
+    ):
+        hand_up(passed)
+    with pytest.raises(CaseError, match="0 fines inside, 30 are needed"):
+        hand_up(changed(finished, **shifted(-1.0)))
+    with pytest.raises(CaseError, match="no fines were supplied"):
+        hand_up(changed(finished, supplied_count=0))
+    sound, table = changed(finished), finished.sections
+    before = table["k_initial_inplace_m2"]
+    sound.__dict__["sections"] = table.assign(k_damaged_inplace_m2=before)
+    with pytest.raises(CaseError, match="no open section lost 2%"):
+        hand_up(sound)
+    with pytest.raises(CaseError, match=r"classes: 2, expected 1 .* where fines passed"):
+        hand_up(changed(finished, passed_count=5), classes=2)
+    assert any("not by a closed face" in note for note in hand_up(finished)[0].notes)
+
+
+def test_a_face_that_plugs_at_once_hands_up_a_cake_alone(finished):
+    cake = {"packed_thickness_m": 4e-4, "resistance_1_m": 1e7, "porosity": 0.5, "k_m2": 4e-11}
+    plugged = changed(finished, **shifted(-1.0), stop_reason="plugged", cake=cake)
+    (handed,) = hand_up(plugged)
+    assert "all is cake" in handed.notes[-1]
+    core = core_flood(plugged, length=0.05, rate=1e-8)
+    assert core["k_over_k0"] == 1.0
+    assert core["closed_at_s"] == 0.0
+    assert core["cake_thickness_m"] > 0
+
+
+def test_classes_of_size_share_the_mud(finished):
+    handed = hand_up(finished, classes=2)[0]
+    assert [one.name for one in handed.mud]
+    total = sum(one.concentration for one in handed.mud)
+    assert total == pytest.approx(finished.case.fines.volume_fraction, rel=1e-12)
+    assert {"rate_1_m", "damage"} & set(hand_up(finished)[0].values()) == {"rate_1_m", "damage"}
+    assert core_flood(finished, length=0.05, rate=1e-8, classes=2)["k_over_k0"] < 1
+
+
+def closed(run):
+    """The run as if its face had closed, with a cake of 1 mm."""
+    cake = {"packed_thickness_m": 1e-3, "resistance_1_m": 2e7, "porosity": 0.5, "k_m2": 5e-11}
+    return changed(run, stop_reason="plugged", cake=cake)
+
+
+def test_a_cake_whose_api_filtrate_is_given_gives_it_back(finished):
+    """8 mL in half an hour at 100 psi, where no fine enters before."""
+    found = core_flood(
+        closed(changed(finished, **shifted(-1.0))),
+        length=1e-5,
+        diameter=np.sqrt(4 * API_AREA / np.pi),
+        pressure=6.895e5,
+        minutes=30.0,
+        api_filtrate=8e-6,
+    )
+    assert found["filtrate_m3"] == pytest.approx(8e-6, rel=0.01)
+
+
+def test_a_well_has_the_skin_of_its_run(finished):
+    found = well_invasion(closed(finished), hours=1.0, pressure=2e6, api_filtrate=8e-6)
+    assert found["skin"] == pytest.approx(found["skin_hawkins"], rel=0.05)
+    assert found["skin_low"] < found["skin"] < found["skin_high"]
+    assert found["perforated"]["skin"] > found["skin"]
+    assert found["time_s"] == 3600.0
+    kept = [row["k_over_k0"] for row in found["k_over_k0"]]
+    assert kept == sorted(kept)
+    radius = np.sqrt(0.108**2 + found["filtrate_m3"] / np.pi / finished.porosity_initial)
+    assert found["invasion_radius_m"] == pytest.approx(radius, rel=1e-3)
+    wide = well_invasion(closed(finished), hours=1.0, pressure=2e6, radius=50.0, api_filtrate=8e-6)
+    assert wide["skin"] < found["skin"] / 100
+    alone = well_invasion(closed(finished), hours=1.0, pressure=2e6)
+    assert any("fills the hole" in one for one in alone["warnings"])
+
+
+def test_the_commands_keep_numbers_figure_and_section(finished, tmp_path, capsys):
+    run = tmp_path / "run"
+    shutil.copytree(finished.path, run)
+    words = ["core", str(run), "--length", "76mm", "--rate", "1ml/min"]
+    assert main([*words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert len(found["sections"]) == 4
+    assert found["sections"][0]["k_over_k0"] < found["sections"][1]["k_over_k0"]
+    assert "deposit of the run's end" in found["warnings"][-1]
+    assert found["history"][0]["rate_m3_s"] == pytest.approx(1e-6 / 60, rel=1e-9)
+    assert json.loads((run / "formation" / "core.json").read_text())["given"]["length"] == 0.076
+    assert main(["well", str(run), "--hours", "2", "--pressure", "300psi", "--quiet"]) == 0
+    text = capsys.readouterr().out
+    assert "skin" in text
+    assert "depth_m" in text
+    page = (run / "report.html").read_text()
+    assert "From the face to a core and a well" in page
+    assert "keeps" in page
+    assert (run / "formation" / "handed_up.svg").is_file()
+    for bad, said in (
+        (["--length", "76"], "has no unit"),
+        (["--length", "76mm"], "one of --rate and --pressure"),
+        (["--length", "76mm", "--rate", "1ml"], "unit of volume"),
+        (["--length", "0mm", "--rate", "1ml/min"], "length: 0, expected a number above 0"),
+    ):
+        with suppress(SystemExit):  # argparse ends by itself
+            assert main(["core", str(run), *bad]) == 2
+        assert said in capsys.readouterr().err
+
+
+def test_of_several_seeds_the_band_is_students():
+    rows = [
+        {"a": 1.0, "b": {"c": 2.0}, "d": [{"e": 1.0}]},
+        {"a": 3.0, "b": {"c": 2.0}, "d": [{"e": 5.0}]},
+    ]
+    found = _merged(rows, seeds=2)
+    assert found["a"] == 2.0
+    assert found["a_low"] == pytest.approx(2.0 - 12.706, rel=1e-4)
+    assert found["b"] == {"c": 2.0}
+    assert found["d"][0]["e"] == 3.0

@@ -1,0 +1,89 @@
+"""A run by the fast model: the same folder as with LIGGGHTS, from the same pack."""
+
+import shutil
+
+import numpy as np
+import pytest
+from builders import tiny
+
+from fdnet.classes.invasion import cake_permeability
+from fdnet.errors import CaseError
+from fdnet.run.finished import open_run
+from fdnet.run.pipeline import run_case
+
+FAST = (
+    "invasion.method=network",
+    "box.sides=periodic",
+    "drag={}",
+    "run={}",
+    "fines.supply=batches",
+    "cake.api_filtrate_mL=5.0",
+)
+
+
+@pytest.fixture(scope="module")
+def fast(tmp_path_factory):
+    return run_case(tiny(*FAST), tmp_path_factory.mktemp("fast") / "run")
+
+
+def test_the_folder_is_that_of_any_run(fast):
+    """Every number of the output contract that does not ask how the fines were moved."""
+    summary, fines = fast.summary, fast.spheres().fines()
+    assert summary["method"] == "network"
+    inside = (fines.position[:, 0] >= 0) & (fines.position[:, 0] < fast.case.size_m[0])
+    assert int(inside.sum()) == summary["invaded_count"] == fast.sections.fines_count.sum() > 0
+    parts = ("invaded_count", "passed_count", "upstream_count")
+    assert summary["supplied_count"] == sum(summary[name] for name in parts)
+    last = fast.history.iloc[-1]
+    assert [last[name] for name in parts] == [summary[name] for name in parts]
+    assert 0 < summary["k_damaged_m2"] < summary["k_initial_m2"]
+    assert (fast.throats.conductance_damaged_m3 <= fast.throats.conductance_initial_m3).all()
+    assert summary["mass_missing"] < 1e-12
+    filled = fast.profile.porosity_initial - fast.profile.porosity_damaged
+    width = fast.profile.x_hi_m - fast.profile.x_lo_m
+    area = fast.case.size_m[1] * fast.case.size_m[2]
+    assert float(filled @ width) * area == pytest.approx(summary["invaded_volume_m3"], rel=1e-6)
+    assert (fast.path / "report.html").stat().st_size > 0
+
+
+def test_the_number_of_the_api_is_that_of_the_cake(fast):
+    """A filtrate given comes out again; without a cake's permeability it is unknown."""
+    assert fast.summary["api_filtrate_mL"] == pytest.approx(5.0, rel=1e-12)
+    by_hand = 2 * cake_permeability(fast.case) * 690e3 * 1800 * (1 - 0.4 - 0.1) / (0.05 * 0.1)
+    assert 1e6 * 45.8e-4 * np.sqrt(by_hand) == pytest.approx(5.0, rel=1e-9)
+
+
+def test_a_killed_run_goes_on_from_the_pack_to_the_same_bits(fast, tmp_path):
+    again = tmp_path / "again"
+    shutil.copytree(fast.path, again)
+    for name in ("manifest.json", "invade/stage.json", "summary.json"):
+        (again / name).unlink()
+    run_case(tiny(*FAST), again, resume=True)
+    for name in ("invade/classes.npz", "sections.csv", "history.csv", "spheres_damaged.csv"):
+        assert (again / name).read_bytes() == (fast.path / name).read_bytes(), name
+    assert open_run(again).summary["k_damaged_m2"] == fast.summary["k_damaged_m2"]
+
+
+def test_the_pack_is_that_of_a_run_with_spheres():
+    spheres = tiny("box.sides=periodic")
+    assert tiny(*FAST).digest("pack") == spheres.digest("pack")
+    assert tiny("box.sides=periodic", "invasion.method=liggghts").digest("pack") == (
+        spheres.digest("pack")
+    )
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        (
+            ("invasion.method=network", "cake.api_filtrate_mL=5", "cake.permeability_m2=1e-18"),
+            "each gives the cake",
+        ),
+        (("cake.permeability_m2=1e-18",), "the table belongs to invasion.method"),
+        (("invasion.method=network", "clean_up.drawdown_MPa=1"), "nothing turns the flow back"),
+        (("invasion.method=network", "grains.motion=mobile"), "grains that stay"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(keys, said):
+    with pytest.raises(CaseError, match=said):
+        tiny(*keys)
