@@ -24,17 +24,19 @@ from fdnet.network.laws.reaching_grains import SpheresBeside
 from fdnet.spheres.snapshot import Array
 
 
-def polygon_flux(corner: Any, discs: Any, middle: Any = None) -> float:
+def polygon_flux(corner: Any, discs: Any, walls: Any = (), middle: Any = None) -> float:
     """Flux m4 through a polygon of 3 or 4 corners among discs (x, y, radius), all in m.
 
-    The rays of a disc are divided at the `middle` (2,) m.
+    The `walls` are discs of `HUGE` radii. The rays of a disc are divided at the `middle` (2,) m.
     """
-    corner, discs = np.array(corner, float), np.array(discs, float)
+    corner, bodies = np.array(corner, float), np.array([*discs, *walls], float)
     four, body = np.zeros((1, 4, 2)), np.zeros((1, MOST_BODIES, 5))
     four[0, : len(corner)] = corner
-    others = np.zeros((len(discs), 5))
-    others[:, :2], others[:, 3] = discs[:, :2], discs[:, 2]
-    around = SpheresBeside(first=np.array([0, len(discs)]), place=others)
+    others = np.insert(bodies, 2, 0.0, axis=1)
+    flatness = np.repeat([1.0, 0.0], [len(discs), len(walls)])
+    around = SpheresBeside(
+        first=np.array([0, len(others)]), place=np.column_stack([others, flatness])
+    )
     place = corner.mean(axis=0) if middle is None else middle
     count = np.array([len(corner)])
     shapes = Shapes(four, count, body, np.ones(1), np.array([place], float))
@@ -52,7 +54,7 @@ def disc_flux(base: Array, disc: Array) -> float:
     start = [*base.mean(axis=0), 0.1 * float(np.ptp(base))]
     found, _, done, _ = fsolve(rims, start, full_output=True)
     middle = found[:2] if done == 1 else None
-    return polygon_flux(base, np.column_stack([base, disc]), middle)
+    return polygon_flux(base, np.column_stack([base, disc]), middle=middle)
 
 
 def wall_flux(place: Any, first: float, second: float) -> float:
@@ -65,9 +67,8 @@ def wall_flux(place: Any, first: float, second: float) -> float:
     corner = [(0.0, one), (apart, two), (apart, 0.0), (0.0, 0.0)]
     if two == 0.0:
         del corner[1]
-    return polygon_flux(
-        corner, [(0.0, one, first), (apart, two, second), (0.5 * apart, -huge, huge)]
-    )
+    discs = [(0.0, one, first), (apart, two, second)]
+    return polygon_flux(corner, discs, [(0.5 * apart, -huge, huge)])
 
 
 def edge_flux(place: Any, disc: float) -> float:
@@ -75,9 +76,8 @@ def edge_flux(place: Any, disc: float) -> float:
     high, far = place
     huge = HUGE * max(place)
     walls = [(0.5 * far, -huge, huge), (far + huge, 0.5 * high, huge)]
-    return polygon_flux(
-        [(0.0, high), (far, high), (far, 0.0), (0.0, 0.0)], [(0.0, high, disc), *walls]
-    )
+    corner = [(0.0, high), (far, high), (far, 0.0), (0.0, 0.0)]
+    return polygon_flux(corner, [(0.0, high, disc)], walls)
 
 
 # ------------------------------------------------------------------------------------------------

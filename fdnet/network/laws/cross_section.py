@@ -177,7 +177,8 @@ def _mirrored(apart: Array, axis: int, tolerance: float) -> Array:
 
 def _set_wall(shapes: Shapes, throats: Array, number: int, place: Array, outward: Array) -> None:
     """Sets a body to the disc that stands for the wall through `place` (K, 2) m."""
-    radius = HUGE * np.ptp(shapes.corner[throats], axis=1).max(axis=1)
+    away = shapes.corner[throats] - shapes.middle[throats, None]
+    radius = 2.0 * HUGE * np.linalg.norm(away, axis=2).max(axis=1)
     shapes.body[throats, number, :2] = place + radius[:, None] * outward
     shapes.body[throats, number, 3] = radius
 
@@ -210,7 +211,7 @@ class RayRoom(NamedTuple):
     which: Array
     """(D,) the discs that a section meets."""
     disc: Array
-    """(D, 3) m, their centres x and y, and radii."""
+    """(D, 4): their centres x and y, and radii, m, and flatness."""
     part: Array
     """(48,) for `flux_on_rays`."""
 
@@ -224,7 +225,7 @@ def ray_room(most: int) -> RayRoom:
         number=np.full(most, -1),
         longest=np.empty(most),
         which=np.empty(most, np.int64),
-        disc=np.empty((most, 3)),
+        disc=np.empty((most, 4)),
         part=np.empty(4 * RAYS),
     )
 
@@ -298,7 +299,7 @@ def aim(base: Array, side: Array, middle: Array, x: float, y: float, rays: Array
 
 @loops_inside
 def end_midway(rays: Array, count: int, disc: Array, other: Array, number: int) -> bool:
-    """Ends the first `count` rays of a disc midway to another one, both (3,): x, y and radius m.
+    """Ends the first `count` rays of a disc midway to another one, both (4,) of a room's discs.
 
     The last rows of `rays` (7, 48) hold where they end and by what: twice the `number` of the
     other disc, and 1 more on the right of it. Returns whether the disc lies in the other.
@@ -333,17 +334,22 @@ def flux_on_rays(
     entry, turn, reach, what, part = rays[3], rays[4], rays[5], rays[6], room.part
     x, y, own = room.disc[number, 0], room.disc[number, 1], room.disc[number, 2]
     r2, farthest = own * own, 0.0
-    for p in range(count):
-        start = max(entry[p], own)
-        d2, t2 = reach[p] * reach[p], start * start
-        whole = d2 * d2 * (0.25 * log_of(reach[p] / own) - 3.0 / 16.0) + r2 * d2 / 8.0
-        part[p] = whole + d2 * t2 / 8.0 + t2 * t2 / 16.0 - r2 * t2 / 8.0
-    for p in range(count):
-        farthest = max(farthest, entry[p])
-    if farthest > own:
+    if room.disc[number, 3] == 0.0:  # a wall, from which all rays start: the flux as a series
+        for p in range(count):
+            gap = (reach[p] - own) * (reach[p] + own) / r2
+            part[p] = r2 * r2 * gap**3 * (1.0 / 24.0 - gap * (1.0 / 96.0 - gap / 240.0))
+    else:
         for p in range(count):
             start = max(entry[p], own)
-            part[p] -= 0.25 * (reach[p] * start) ** 2 * log_of(start / own)
+            d2, t2 = reach[p] * reach[p], start * start
+            whole = d2 * d2 * (0.25 * log_of(reach[p] / own) - 3.0 / 16.0) + r2 * d2 / 8.0
+            part[p] = whole + d2 * t2 / 8.0 + t2 * t2 / 16.0 - r2 * t2 / 8.0
+        for p in range(count):
+            farthest = max(farthest, entry[p])
+        if farthest > own:
+            for p in range(count):
+                start = max(entry[p], own)
+                part[p] -= 0.25 * (reach[p] * start) ** 2 * log_of(start / own)
     total, on_rays, wedge, angle, nearest = 0.0, 0.0, 0.0, 0.0, np.inf
     for p in range(count):
         angle += turn[p]
@@ -411,6 +417,7 @@ def meet(bodies: Array, z: float, tip: float, first: int, count: int, room: RayR
             own = room.disc[count]
             room.which[count] = first + i
             own[0], own[1], own[2] = bodies[i, 0], bodies[i, 1], np.sqrt(square)
+            own[3] = bodies[i, 4]
             count += 1
     return count
 
