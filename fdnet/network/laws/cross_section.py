@@ -31,7 +31,7 @@ from fdnet.spheres.snapshot import Array
 TIP = 1e-2
 """Smallest radius of the disc that a sphere of the facet shows in a section, in its own radii."""
 HUGE = 100.0
-"""Radius of the disc that stands for a wall, in lengths of the section."""
+"""Radius of the disc that stands for a wall, in widths of the section."""
 MOST_BODIES = 5
 """What holds the fluid of a throat: three spheres at the corners and two walls."""
 DOUBLE_EDGE_SHARE = 0.25
@@ -261,8 +261,13 @@ def aim(base: Array, side: Array, middle: Array, x: float, y: float, rays: Array
     what `set_sides` sets. The rows of `rays` (7, 48) are the direction, where a ray
     meets the far side and where it enters the polygon, m, its angle rad, and room.
     """
-    first, many = 0, len(base)
-    for far in range(many):
+    first, many, lead = 0, len(base), np.int64(0)
+    for i in range(many):  # the first far side, so that neighbouring rays are neighbours
+        here = inwards(base, side, i, x, y) > ON_SIDE * side[i, 2]
+        if here and inwards(base, side, i - 1, x, y) <= ON_SIDE * side[i - 1, 2]:
+            lead = np.int64(i)
+    for place in range(lead, lead + many):
+        far = place % many
         depth = inwards(base, side, far, x, y)
         if depth <= ON_SIDE * side[far, 2]:
             continue
@@ -274,7 +279,8 @@ def aim(base: Array, side: Array, middle: Array, x: float, y: float, rays: Array
         entry, turn = rays[3, first:], rays[4, first:]
         dx, dy = middle[0] - x, middle[1] - y
         across = dx * ey - dy * ex
-        split = (dy * vx - dx * vy) / across if across != 0.0 else 0.5
+        there = abs(across) <= ON_SIDE * side[far, 2] ** 2  # the disc is centred in the middle
+        split = 0.5 if there else (dy * vx - dx * vy) / across
         split = split if NEAR_END < split < 1.0 - NEAR_END else 0.5
         for p in range(min(RAYS, len(entry))):
             low, wide = (0.0, split) if p < HALF else (split, 1.0 - split)
@@ -322,13 +328,14 @@ def end_midway(rays: Array, count: int, disc: Array, other: Array, number: int) 
 
 @loops_inside
 def flux_on_rays(
-    rays: Array, count: int, number: int, room: RayRoom, table: Array
+    rays: Array, count: int, number: int, around: bool, room: RayRoom, table: Array
 ) -> tuple[float, float]:
     """Flux m4 on the first `count` rays of the disc `number`, to where they end.
 
     `rays` (7, 48) is what `aim` and `end_midway` set. A ray that enters the polygon outside its
-    disc carries the part from there of what an annulus carries from the rim. Neighbouring rays to
-    one far side that one other disc ends, on one side of it, are a wedge.
+    disc carries the part from there of what an annulus carries from the rim. Neighbouring rays
+    that one other disc ends, on one side of it, are a wedge, and so are those that end on one side
+    of the polygon. Wedges of rays `around` the disc, whose first is anyone, end at each far side.
     The second flux is that without the shear between rays.
     """
     entry, turn, reach, what, part = rays[3], rays[4], rays[5], rays[6], room.part
@@ -356,7 +363,8 @@ def flux_on_rays(
         if reach[p] > max(entry[p], own):
             wedge += turn[p] * part[p]
             nearest = min(nearest, reach[p])
-        if (p + 1) % RAYS == 0 or what[p + 1] != what[p]:
+        ends = (p + 1) % RAYS == 0 and (around or what[p] < 0.0)
+        if ends or p + 1 == count or what[p + 1] != what[p]:
             if wedge > 0.0:
                 if what[p] >= 0.0:  # the point midway on the line between the centres
                     other = room.disc[int(what[p]) // 2]
@@ -397,7 +405,7 @@ def flux_among(
             if k != number and not swallowed and apart - other[2] + disc[2] < 2.0 * longest:
                 swallowed = end_midway(rays, many, disc, other, k)
         if many > 0 and not swallowed:
-            one, plain = flux_on_rays(rays, many, number, room, table)
+            one, plain = flux_on_rays(rays, many, number, many == RAYS * len(base), room, table)
             total, on_rays = total + one, on_rays + plain
     return total, on_rays
 
