@@ -8,14 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.commands.options import (
-    LIGGGHTS,
-    OUTPUT,
-    THE_CASE,
-    case_of,
-    new_command,
-    stages_of,
-)
+from fdnet.commands.options import LIGGGHTS, OUTPUT, THE_CASE, case_of, new_command, stages_of
 from fdnet.errors import PAGE, CaseError
 from fdnet.files import path_option
 

@@ -23,12 +23,7 @@ from fdnet.network.fines.deposit import (
 from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.section_archie import (
-    KeptSections,
-    ThroatPart,
-    measured_sections,
-    parts_of,
-)
+from fdnet.network.laws.section_archie import KeptSections, ThroatPart, measured_sections, parts_of
 from fdnet.network.network import Network, build_network
 from fdnet.spheres.geometry import neighbour_tree, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot, frozen

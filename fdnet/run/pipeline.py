@@ -76,13 +76,7 @@ from fdnet.run.summary import summarise
 from fdnet.scales.check import every_finding
 from fdnet.scales.cost import over_limit
 from fdnet.scales.pack import grain_count, refuse_unreachable
-from fdnet.scales.scales import (
-    InvasionScales,
-    Scales,
-    back_flow,
-    invasion_scales,
-    scales_of,
-)
+from fdnet.scales.scales import InvasionScales, Scales, back_flow, invasion_scales, scales_of
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Directions, Snapshot
 
@@ -406,11 +400,7 @@ def with_finer(results: Results, supplied: int) -> Results:
 
 
 def with_default_laws(
-    grains: Snapshot,
-    damaged: Snapshot | None,
-    *,
-    periodic: Directions,
-    options: AnalysisChoices,
+    grains: Snapshot, damaged: Snapshot | None, *, periodic: Directions, options: AnalysisChoices
 ) -> "Analysis":
     """The analysis; by laws that are off by factors, a warning has the numbers by the default."""
     from fdnet.network.permeability import compare
