@@ -8,7 +8,7 @@ the run folder keeps (docs/how-to/check_the_face.md).
 import html
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -113,7 +113,7 @@ class KeptGrid(JsonObject):
     unknowns: int
 
 
-def read_grids(path: Path) -> list[KeptGrid]:
+def read_grids(path: Path) -> list[dict[str, Any]]:
     """The solved grids of a run, none without the file. Raises CaseError for another content."""
     if not path.is_file():
         return []
@@ -121,7 +121,7 @@ def read_grids(path: Path) -> list[KeptGrid]:
         rows = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(rows, list):
             raise ValueError(f"{type(rows).__name__}, expected a list")
-        return [KeptGrid.model_validate(row) for row in rows]
+        return [KeptGrid.model_validate(row).model_dump() for row in rows]
     except (OSError, ValueError) as error:
         raise CaseError(
             f"{path}: cannot be read as solved grids ({error}); remove it, and its grids are "
@@ -131,16 +131,10 @@ def read_grids(path: Path) -> list[KeptGrid]:
 
 def flow_through(slab: ResolvedSlab, cells: int, path: Path, follow: Follow) -> StokesFlow:
     """The flow on one grid, out of the file at `path` or solved and added to it."""
-    key = {
-        "state": slab.state,
-        "x_lo_m": slab.span[0],
-        "x_hi_m": slab.span[1],
-        "cells": cells,
-        "spheres": slab.digest,
-    }
-    kept, names = read_grids(path), [one.name for one in fields(StokesFlow)]
-    for one in kept:
-        row = one.model_dump()
+    key = {"state": slab.state, "x_lo_m": slab.span[0], "x_hi_m": slab.span[1]}
+    key |= {"cells": cells, "spheres": slab.digest}
+    rows, names = read_grids(path), [one.name for one in fields(StokesFlow)]
+    for row in rows:
         if key.items() <= row.items():
             return StokesFlow(**{name: row[name] for name in names})
     size = slab.size(cells)
@@ -152,27 +146,16 @@ def flow_through(slab: ResolvedSlab, cells: int, path: Path, follow: Follow) -> 
         flow = solve_slab(
             slab.spheres, slab.span, cells=cells, tolerance=K_TOLERANCE, closed=slab.closed
         )
-    rows = [one.model_dump() for one in kept]
     rows.append(key | {name: getattr(flow, name) for name in names})
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, json.dumps(rows, indent=1) + "\n")
     return flow
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StokesSection:
-    """A section, cut out, by resolved flow.
+class StokesSection(JsonObject):
+    """A section, cut out, by resolved flow: lengths in m, permeabilities in m2.
 
-    Attributes:
-        x_lo_m: where it begins, m.
-        x_hi_m: where it ends, m.
-        k_initial_m2: without fines, m2.
-        k_initial_error: share of it.
-        k_damaged_m2: with fines, m2.
-        k_damaged_error: share of it.
-        k_reduction: 1 - k_damaged_m2 / k_initial_m2.
-        cell_initial_m: edge of a cell of the finer grid without fines, m.
-        cell_damaged_m: edge of a cell of the finer grid with fines, m.
+    An error is a share of its permeability, a cell the edge of one of the finer grid.
     """
 
     x_lo_m: float
@@ -233,19 +216,12 @@ def stokes_sections(
                 )
                 row |= {f"k_{name}_m2": k.k, f"k_{name}_error": k.error}
                 row[f"cell_{name}_m"] = float(slab.edges.max()) / slab.cells[1]
-            one = StokesSection(
-                x_lo_m=before.span[0],
-                x_hi_m=before.span[1],
-                k_reduction=1.0 - row["k_damaged_m2"] / row["k_initial_m2"],
-                **row,
-            )
-            others = [
-                other
-                for other in read_sections(table)
-                if (other.x_lo_m, other.x_hi_m) != before.span
-            ]
+            lo, hi = before.span
+            row["k_reduction"] = 1.0 - row["k_damaged_m2"] / row["k_initial_m2"]
+            others = [one for one in read_sections(table) if (one.x_lo_m, one.x_hi_m) != (lo, hi)]
+            every = [*others, StokesSection(x_lo_m=lo, x_hi_m=hi, **row)]
             table.parent.mkdir(exist_ok=True)
-            write_rows(table, sorted(map(asdict, [*others, one]), key=lambda row: row["x_lo_m"]))
+            write_rows(table, [vars(one) for one in sorted(every, key=lambda one: one.x_lo_m)])
         rows = with_network(read_sections(table), run.summary)
         if (run.path / "report.html").is_file():
             put_section(run.path / "report.html", STOKES, stokes_html(rows))
@@ -254,17 +230,17 @@ def stokes_sections(
 
 def _slabs(run: FinishedRun, numbers: Sequence[int], across: float) -> list[list[ResolvedSlab]]:
     """Each section before and, where fines reach into it or grains moved, after the invasion."""
+    if _slips(run.case):
+        raise CaseError(
+            "analysis.walls: 'slip', but resolved flow knows only side walls that hold the "
+            "fluid; analyse the run with analysis.walls = 'no-slip' first"
+        )
     spheres = {state: run.spheres(state) for state in ("initial", "damaged")}
     sections, (_, y, z), pairs = run.summary["sections"], run.case.periodic, []
     for number in numbers:
         if not 1 <= number <= len(sections):
             raise CaseError(
                 f"--section: {number}, expected 1 to {len(sections)}, the sections of the run"
-            )
-        if _slips(run.case):
-            raise CaseError(
-                "analysis.walls: 'slip', but resolved flow knows only side walls that hold the "
-                "fluid; analyse the run with analysis.walls = 'no-slip' first"
             )
         span = (sections[number - 1]["x_lo_m"], sections[number - 1]["x_hi_m"])
         pair = [
@@ -324,7 +300,7 @@ def with_network(
             if one.x_lo_m == section["x_lo_m"] and one.x_hi_m == section["x_hi_m"]:
                 names = ("k_initial_m2", "k_damaged_m2", "k_reduction")
                 network = {f"network_{name}": section[name] for name in names}
-                rows.append({"section": section["section"]} | asdict(one) | network | law)
+                rows.append({"section": section["section"]} | vars(one) | network | law)
     return rows
 
 
@@ -335,17 +311,11 @@ def read_sections(path: Path) -> list[StokesSection]:
     """
     if not path.is_file():
         return []
-    names = [one.name for one in fields(StokesSection)]
     try:
-        table = read_table(path, names)[names]
-        if not np.isfinite(table.to_numpy(float)).all():
-            raise CaseError("a number is not finite")
+        rows = read_table(path, list(StokesSection.model_fields)).to_dict("records")
+        return [StokesSection.model_validate(row) for row in rows]
     except (CaseError, ValueError) as error:
         why = str(error).partition("; ")[0].removeprefix(f"{path}: ")
         raise CaseError(
-            f"{path}: cannot be read ({why}), expected numbers below {', '.join(names)}; remove "
-            "it and call fdnet stokes again"
+            f"{path}: cannot be read ({why}); remove it and call fdnet stokes again"
         ) from error
-    return [
-        StokesSection(**dict(zip(names, row, strict=True))) for row in table.to_numpy().tolist()
-    ]

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -26,10 +25,11 @@ from fdnet.run.stokes_sections import (
 ROUGH, ROUGH_GRAIN = 1.0, 7.0
 """Cells across the radius of a fine and of a grain that keep the tests short."""
 
-HEAD = b",".join(one.name.encode() for one in fields(StokesSection)) + b"\n1,1\n"
+NAMES = list(StokesSection.model_fields)
+HEAD = ",".join(NAMES).encode() + b"\n1,1\n"
 """A table whose row has too few numbers."""
 
-NOT_FINITE = HEAD.replace(b"\n1,1", b"\n" + b",".join([b"nan"] * len(fields(StokesSection))))
+NOT_FINITE = HEAD.replace(b"\n1,1", b"\n" + b",".join([b"nan"] * len(NAMES)))
 
 
 def grid(cells: int, k: float) -> StokesFlow:
