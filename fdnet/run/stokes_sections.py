@@ -315,7 +315,7 @@ def read_sections(path: Path) -> list[StokesSection]:
         rows = read_table(path, list(StokesSection.model_fields)).to_dict("records")
         return [StokesSection.model_validate(row) for row in rows]
     except (CaseError, ValueError) as error:
-        why = str(error).partition("; ")[0].removeprefix(f"{path}: ")
         raise CaseError(
-            f"{path}: cannot be read ({why}); remove it and call fdnet stokes again"
+            f"{path}: is no table of resolved sections, expected a number in each of its columns; "
+            "remove it and call fdnet stokes again"
         ) from error
