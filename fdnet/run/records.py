@@ -8,7 +8,7 @@ import shlex
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -145,15 +145,14 @@ def run_record(run: Execution) -> dict[str, Any]:
 
 
 def record_warnings(
-    case: Case, pack: dict[str, Any], invasion: dict[str, Any] | None
+    case: Case, pack: Mapping[str, Any], invasion: Mapping[str, Any]
 ) -> Iterator[str]:
     """Doubts about the DEM runs, from the records of their stages.
 
     They are another LIGGGHTS than fdnet was measured with, large overlaps, and how the runs ended.
     """
     version = pack["runs"][0]["version"]
-    if invasion is not None:
-        yield from invasion["warnings"]
+    yield from invasion.get("warnings", [])
     if version != KNOWN_VERSION:
         yield Doubt(
             "another-liggghts",
@@ -179,7 +178,7 @@ def record_warnings(
             f"{pack['porosity_assumed']:.3f} (plain sum of grains.count), the pack has "
             f"{pack['porosity']:.3f}: give grains.porosity instead of the count",
         )
-    if invasion is None:
+    if not invasion:
         return
     step = invasion.get("max_overlap_step", invasion["steps"])
     deepest = Deepest(step=step, fraction=invasion["max_overlap"])
@@ -198,52 +197,27 @@ def record_warnings(
         )
 
 
-def stage_seconds(
-    pack: dict[str, Any],
-    invasion: dict[str, Any] | None,
-    own: dict[str, float],
-    *,
-    cleaned: dict[str, Any] | None = None,
-) -> dict[str, float]:
-    """Seconds of each stage, and those of them that LIGGGHTS took.
-
-    They are those of the session that finished the stage; `own` are those of this session.
-    """
-    runs = [run for one in (pack, invasion, cleaned) if one for run in one["runs"]]
-    waited = sum(run.get("waited", 0.0) for run in runs)
-    return {
-        "pack": pack["seconds"],
-        "invade": invasion["seconds"] if invasion else 0.0,
-        **({"clean_up": cleaned["seconds"]} if cleaned else {}),
-        "analyse": own.get("analyse", 0.0),
-        "report": own.get("report", 0.0),
-        "liggghts": sum(run["seconds"] for run in runs)
-        + sum(row["liggghts_s"] for row in pack["attempts"][:-1])
-        - waited,
-        **({"updates": waited} if waited else {}),
-    }
-
-
 def stage_costs(
-    stages: Sequence[dict[str, Any] | None], own: Mapping[str, float]
+    records: Mapping[str, dict[str, Any] | None], session: "Session"
 ) -> dict[str, dict[str, Any]]:
-    """Keys of the summary: processor seconds and peak memory of LIGGGHTS and of fdnet itself.
+    """Keys of the summary: seconds, processor seconds and peak memory.
 
-    `stages` are the records of those that run LIGGGHTS, each with the seconds of the session that
-    finished it; `own` are fdnet's processor seconds in this session. The memory of fdnet is that
-    of this process so far, of LIGGGHTS that of its largest run.
+    They are those of the session that finished a stage. The memory of fdnet is that of this
+    process so far, of LIGGGHTS that of its largest run.
     """
-    done = [record for record in stages if record]
-    runs = [run for record in done for run in record["runs"]]
-    earlier = [row for record in done for row in record.get("attempts", [])[:-1]]
+    done = {stage: record for stage, record in records.items() if record}
+    runs = [run for record in done.values() for run in record["runs"]]
+    waited = sum(run.get("waited", 0.0) for run in runs)
+    failed = sum(row["liggghts_s"] for row in done["pack"]["attempts"][:-1])
     peaks = [run.get("peak_memory_bytes") for run in runs]
     return {
-        "cpu_seconds": {
-            "liggghts": sum(run.get("cpu_seconds", 0.0) for run in runs)
-            + sum(row.get("liggghts_cpu_s", 0.0) for row in earlier),
-            "python": sum(record.get("cpu_seconds", 0.0) for record in done)
-            + sum(own.get(stage, 0.0) for stage in ("analyse", "report")),
+        "seconds": {
+            **{stage: done[stage]["seconds"] if stage in done else 0.0 for stage in records},
+            **{stage: session.seconds.get(stage, 0.0) for stage in ("analyse", "report")},
+            "liggghts": sum(run["seconds"] for run in runs) + failed - waited,
+            **({"updates": waited} if waited else {}),
         },
+        "cpu_seconds": processor_seconds(done.values(), session.cpu_seconds),
         "peak_memory_bytes": {
             "liggghts": None if None in peaks else max(peaks, default=0),
             "python": peak_resident_bytes(),
@@ -251,17 +225,19 @@ def stage_costs(
     }
 
 
-def versions(pack: dict[str, Any] | None) -> dict[str, str]:
-    """Versions of everything that shaped the run."""
-    packages = {}
-    for name in _PACKAGES:
-        try:
-            packages[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            packages[name] = "not installed as a package"
-    liggghts = {"liggghts": pack["runs"][0]["version"]} if pack else {}
-    python, system = sys.version.split()[0], platform.platform()
-    return {**packages, "python": python, **liggghts, "system": system}
+def processor_seconds(
+    records: Iterable[dict[str, Any] | None], own: Mapping[str, float]
+) -> dict[str, float]:
+    """Of LIGGGHTS and of fdnet in stages with these records, and in those of this session."""
+    done = [record for record in records if record]
+    runs = [run for record in done for run in record["runs"]]
+    earlier = [row for record in done for row in record.get("attempts", [])[:-1]]
+    return {
+        "liggghts": sum(run.get("cpu_seconds", 0.0) for run in runs)
+        + sum(row.get("liggghts_cpu_s", 0.0) for row in earlier),
+        "python": sum(record.get("cpu_seconds", 0.0) for record in done)
+        + sum(own.get(stage, 0.0) for stage in ("analyse", "report")),
+    }
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -374,6 +350,18 @@ class Session:
     def wants(self, stage: str) -> bool:
         """Whether the stage was asked for and belongs to the case."""
         return stage in self.options.stages and stage in self.case.stages
+
+    def versions(self) -> dict[str, str]:
+        """Versions of everything that shaped the run."""
+        packages = {}
+        for name in _PACKAGES:
+            try:
+                packages[name] = metadata.version(name)
+            except metadata.PackageNotFoundError:
+                packages[name] = "not installed as a package"
+        pack, python = self.folder.record("pack") or {}, sys.version.split()[0]
+        liggghts, system = pack["runs"][0]["version"], platform.platform()
+        return {**packages, "python": python, "liggghts": liggghts, "system": system}
 
     def launch(self, progress: Progress) -> Launch:
         """How a stage that begins now starts LIGGGHTS, within its time limit."""
