@@ -46,8 +46,6 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     record = {
         "format": RECORD_FORMAT,
         "digest": start.digest,
-        "seconds": session.seconds[STAGE],
-        "cpu_seconds": session.cpu_seconds[STAGE],
         "stop_reason": result.stop_reason,
         "out": last.out,
         "max_overlap": overlap_in(case, result.state).fraction,
@@ -60,7 +58,7 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
         "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out],
     }
-    session.folder.finish(STAGE, record)
+    session.finish(STAGE, record)
 
 
 def fluid_turned_back(flow: BackFlow, grains: Snapshot) -> DrivingFluid | None:

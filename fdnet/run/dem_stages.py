@@ -42,9 +42,7 @@ def pack_stage(session: Session) -> None:
     progress = Progress("pack", Forecast(expected=expected), show=session.options.show_progress)
     with session.timed("pack"), progress:
         pack = make_pack(case, folder, session.launch(progress))
-    seconds, assumed = session.seconds["pack"], session.scales.porosity
-    record = pack_record(case, pack, folder, assumed=assumed, seconds=seconds)
-    session.folder.finish("pack", record | {"cpu_seconds": session.cpu_seconds["pack"]})
+    session.finish("pack", pack_record(case, pack, folder, assumed=session.scales.porosity))
 
 
 def invade_stage(session: Session, case: InvasionCase) -> None:
@@ -56,18 +54,13 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
         with session.timed("invade"):
             model = class_model(case, scales, grains)
             record = write_class_invasion(case, model, folder)
-        spent = {
-            "seconds": session.seconds["invade"],
-            "cpu_seconds": session.cpu_seconds["invade"],
-        }
-        session.folder.finish("invade", record | spent)
+        session.finish("invade", record)
         return
     progress = Progress("invade", _forecast(case, scales), show=session.options.show_progress)
     with session.timed("invade"), progress:
         launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
         result = invade(case, scales, grains, folder, launch, fluid=fluid)
-    record = invade_record(case, result, folder, seconds=session.seconds["invade"])
-    session.folder.finish("invade", record | {"cpu_seconds": session.cpu_seconds["invade"]})
+    session.finish("invade", invade_record(case, result, folder))
 
 
 def _forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
@@ -100,7 +93,7 @@ def invasion_record(session: Session, case: InvasionCase) -> dict[str, Any]:
         (row.chunk * scales.checkpoint_steps, row.invaded + row.passed) for row in result.history
     ]
     share = seen[-1][0] / _forecast(case, scales).end(seen)
-    return invade_record(case, result, folder, seconds=0.0) | {"share_done": share}
+    return invade_record(case, result, folder) | {"share_done": share}
 
 
 def is_done(session: Session, stage: str) -> bool:

@@ -23,6 +23,7 @@ from fdnet.classes.beside_spheres import (
     Stands,
     finer_classes,
 )
+from fdnet.classes.invasion import velocity_in
 from fdnet.dem.checkpoint import Checkpoint, entered_by, time_of
 from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
@@ -345,7 +346,10 @@ class NetworkFluid:
         moving = np.where(within & ~held, crowd, 0.0) / pack.network.area
         slow, gain = float(moving @ shape[:, 0]), float(moving @ fines.velocity[:, 0])
         more = 0.0 if finer is None else self._viscosity * finer.resistance
-        speed = self._velocity(carried, cake + more + slow, gain)
+        speed, own = self.first_velocity, self._viscosity * pack.length / pack.permeability
+        if self.case.drag.drive != "rate":
+            resists, back = (cake + more + slow) / own, gain / own
+            speed = velocity_in(speed, self.rest, carried.k_over_k0, resists, back)
         # drops of pressure as simulated, Pa: of what moves in the pack, and of all that stands
         loose = slow * speed - gain
         drop = self._viscosity * speed * pack.length / pack.permeability / carried.k_over_k0
@@ -436,20 +440,6 @@ class NetworkFluid:
             even_to=float(field.low[0]),
         )
         return mean / pace
-
-    def _velocity(self, carried: Carried, more: float, gain: float = 0.0) -> float:
-        """Superficial velocity U, m/s.
-
-        Cake and moving fines resist with `more` Pa s/m, and the motion of the fines gives back
-        `gain` Pa. At constant pressure, with the resistance R0 = mu L / k0 of the intact pack,
-
-            U = (U0 (1 + rest) + gain / R0) / (k0 / k + rest + more / R0).
-        """
-        if self.case.drag.drive == "rate":
-            return self.first_velocity
-        intact = self._viscosity * self.pack.length / self.pack.permeability
-        resistance = 1.0 / carried.k_over_k0 + self.rest + more / intact
-        return (self.first_velocity * (1.0 + self.rest) + gain / intact) / resistance
 
     @property
     def _viscosity(self) -> float:

@@ -52,14 +52,11 @@ _PACKAGES = ["fdnet", "numpy", "scipy", "pandas", "jinja2", "pyvista", "matplotl
 _PACKAGES += ["overlap", "pymetis"]
 
 
-def pack_record(
-    case: Case, pack: Pack, folder: Path, *, assumed: float, seconds: float
-) -> dict[str, Any]:
+def pack_record(case: Case, pack: Pack, folder: Path, *, assumed: float) -> dict[str, Any]:
     """pack/stage.json: how the pack in `folder` was reached."""
     return {
         "format": RECORD_FORMAT,
         "digest": case.digest("pack"),
-        "seconds": seconds,
         "porosity_assumed": assumed,
         "porosity": pack.porosity,
         "porosity_error": pack.porosity_error,
@@ -77,16 +74,13 @@ def pack_record(
     }
 
 
-def invade_record(
-    case: InvasionCase, result: Invasion, folder: Path, *, seconds: float
-) -> dict[str, Any]:
+def invade_record(case: InvasionCase, result: Invasion, folder: Path) -> dict[str, Any]:
     """invade/stage.json: how the invasion in `folder` ended."""
     dumps = [f"post/invade_{row.step}.dump" for row in result.history]
     finer = finer_file(result.history[-1].step)
     return {
         "format": RECORD_FORMAT,
         "digest": case.digest("invade"),
-        "seconds": seconds,
         "stop_reason": result.stop_reason,
         "max_overlap": result.overlap.fraction,
         "max_overlap_step": result.overlap.step,
@@ -212,7 +206,7 @@ def stage_costs(
     peaks = [run.get("peak_memory_bytes") for run in runs]
     return {
         "seconds": {
-            **{stage: done[stage]["seconds"] if stage in done else 0.0 for stage in records},
+            **{stage: (one or {}).get("seconds", 0.0) for stage, one in records.items()},
             **{stage: session.seconds.get(stage, 0.0) for stage in ("analyse", "report")},
             "liggghts": sum(run["seconds"] for run in runs) + failed - waited,
             **({"updates": waited} if waited else {}),
@@ -384,6 +378,11 @@ class Session:
         used = time.process_time() - cpu
         self.cpu_seconds[stage] = self.cpu_seconds.get(stage, 0.0) + used
 
+    def finish(self, stage: str, record: dict[str, Any]) -> None:
+        """Mark a stage as done, with the time that it took in this session."""
+        spent = {"seconds": self.seconds[stage], "cpu_seconds": self.cpu_seconds[stage]}
+        self.folder.finish(stage, record | spent)
+
 
 # ------------------------------------------------------------------------------------------------
 # A pack that several runs share: made once, and copied into each of them.
@@ -418,11 +417,9 @@ def take_pack(session: Session, source: Path) -> None:
         )
     nothing = ("liggghts_s", "liggghts_cpu_s")
     own = {
-        "seconds": session.seconds["pack"],
-        "cpu_seconds": session.cpu_seconds["pack"],
         "taken_from": str(source),
         "made_in_seconds": record["seconds"],
         "runs": [row | {"seconds": 0.0, "cpu_seconds": 0.0} for row in record["runs"]],
         "attempts": [row | dict.fromkeys(nothing, 0.0) for row in record["attempts"]],
     }
-    session.folder.finish("pack", record | own)
+    session.finish("pack", record | own)
