@@ -397,7 +397,8 @@ def seconds_line(summary: Mapping[str, Any]) -> str:
     """What the run took."""
     seconds = summary["seconds"]
     outside = sum(seconds.get(stage, 0.0) for stage in STAGES) - seconds["liggghts"]
-    return f"seconds       {seconds['liggghts']:.1f} in LIGGGHTS, {outside:.1f} outside"
+    cut = ", without the invasion so far" if summary["stop_reason"] == "unfinished" else ""
+    return f"seconds       {seconds['liggghts']:.1f} in LIGGGHTS, {outside:.1f} outside{cut}"
 
 
 def text_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:

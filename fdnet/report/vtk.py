@@ -173,19 +173,3 @@ def write_flux_vtp(path: str | Path, network: Any, values: Array) -> Path:
     mesh, *_ = _network_mesh(network)
     mesh.cell_data["value"] = np.asarray(values, float)
     return _save(path, mesh)
-
-
-def write_lines_vtp(path: str | Path, lines: Sequence[tuple[Array, Array]]) -> Path:
-    """Lines of points (M, 3) m, each with its values (M,) as `value`, for a picture."""
-    import pyvista as pv
-
-    counts = [len(points) for points, _ in lines]
-    if not counts:
-        return _save(path, pv.PolyData())
-    first = np.cumsum([0, *counts[:-1]])
-    cells = [np.append(n, at + np.arange(n)) for n, at in zip(counts, first, strict=True)]
-    mesh = pv.PolyData(
-        np.concatenate([points for points, _ in lines]), lines=np.concatenate(cells)
-    )
-    mesh.point_data["value"] = np.concatenate([values for _, values in lines])
-    return _save(path, mesh)
