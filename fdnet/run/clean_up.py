@@ -12,7 +12,7 @@ from fdnet.dem.invade_deck import DrivingFluid
 from fdnet.errors import explained
 from fdnet.run.dem_stages import invaded, invasion_record, is_done, packed_grains
 from fdnet.run.fluid import Mirrored, fluid_of, mirrored
-from fdnet.run.folder import RECORD_FORMAT, START_OVER, check_files, digests_of
+from fdnet.run.folder import START_OVER, check_files, digests_of
 from fdnet.run.progress import Progress
 from fdnet.run.records import Session, run_record
 from fdnet.scales.scales import BackFlow, back_flow
@@ -44,8 +44,6 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     dumps = (f"post/clean_{row.step}.dump" for row in result.history)
     steps = last.chunk * flow.scales.checkpoint_steps
     record = {
-        "format": RECORD_FORMAT,
-        "digest": start.digest,
         "stop_reason": result.stop_reason,
         "out": last.out,
         "max_overlap": overlap_in(case, result.state).fraction,

@@ -42,7 +42,7 @@ def pack_stage(session: Session) -> None:
     progress = Progress("pack", Forecast(expected=expected), show=session.options.show_progress)
     with session.timed("pack"), progress:
         pack = make_pack(case, folder, session.launch(progress))
-    session.finish("pack", pack_record(case, pack, folder, assumed=session.scales.porosity))
+    session.finish("pack", pack_record(pack, folder, assumed=session.scales.porosity))
 
 
 def invade_stage(session: Session, case: InvasionCase) -> None:

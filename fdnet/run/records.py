@@ -52,11 +52,9 @@ _PACKAGES = ["fdnet", "numpy", "scipy", "pandas", "jinja2", "pyvista", "matplotl
 _PACKAGES += ["overlap", "pymetis"]
 
 
-def pack_record(case: Case, pack: Pack, folder: Path, *, assumed: float) -> dict[str, Any]:
+def pack_record(pack: Pack, folder: Path, *, assumed: float) -> dict[str, Any]:
     """pack/stage.json: how the pack in `folder` was reached."""
     return {
-        "format": RECORD_FORMAT,
-        "digest": case.digest("pack"),
         "porosity_assumed": assumed,
         "porosity": pack.porosity,
         "porosity_error": pack.porosity_error,
@@ -79,8 +77,6 @@ def invade_record(case: InvasionCase, result: Invasion, folder: Path) -> dict[st
     dumps = [f"post/invade_{row.step}.dump" for row in result.history]
     finer = finer_file(result.history[-1].step)
     return {
-        "format": RECORD_FORMAT,
-        "digest": case.digest("invade"),
         "stop_reason": result.stop_reason,
         "max_overlap": result.overlap.fraction,
         "max_overlap_step": result.overlap.step,
@@ -380,8 +376,9 @@ class Session:
 
     def finish(self, stage: str, record: dict[str, Any]) -> None:
         """Mark a stage as done, with the time that it took in this session."""
-        spent = {"seconds": self.seconds[stage], "cpu_seconds": self.cpu_seconds[stage]}
-        self.folder.finish(stage, record | spent)
+        own = {"format": RECORD_FORMAT, "digest": self.case.digest(stage)}
+        own |= {"seconds": self.seconds[stage], "cpu_seconds": self.cpu_seconds[stage]}
+        self.folder.finish(stage, own | record)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -417,6 +414,8 @@ def take_pack(session: Session, source: Path) -> None:
         )
     nothing = ("liggghts_s", "liggghts_cpu_s")
     own = {
+        "cpu_seconds": session.cpu_seconds["pack"],
+        "seconds": session.seconds["pack"],
         "taken_from": str(source),
         "made_in_seconds": record["seconds"],
         "runs": [row | {"seconds": 0.0, "cpu_seconds": 0.0} for row in record["runs"]],

@@ -1,15 +1,14 @@
 """Sections of a finished run by resolved Stokes flow, and what the network gives for them.
 
 Resolved flow needs no law of throats. It takes minutes where the network takes seconds, so it is
-computed for the sections that a user names, mostly the first. Each is solved on two grids, which
-the run folder keeps (docs/how-to/check_the_face.md).
+computed for the sections that a user names, mostly the first, each on two grids
+(docs/how-to/check_the_face.md).
 """
 
 import html
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
-from math import ceil
+from dataclasses import dataclass
+from math import ceil, isclose
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +17,10 @@ from scipy import fft
 
 from fdnet.case.case import Case
 from fdnet.errors import CaseError
-from fdnet.files import write_text
 from fdnet.network.states import cut_out
 from fdnet.network.stokes import StokesFlow, Walled, divide, estimate, solve_slab
 from fdnet.report.html import STOKES, put_section, stokes_html
-from fdnet.report.tables import JsonObject, Positive, read_table, write_rows
+from fdnet.report.tables import JsonObject, read_table, write_rows
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import locked
 from fdnet.run.records import cores
@@ -39,8 +37,8 @@ BYTES = 200
 """Memory for each cell."""
 SECONDS = {"initial": 1.2e-5, "damaged": 2.5e-5}
 """For each cell, on one core."""
-KEPT_IN, GRIDS, RESOLVED = "stokes", "grids.json", "sections.csv"
-"""Folder in the run folder, the file of the solved grids, the table of the sections."""
+KEPT_IN, RESOLVED = "stokes", "sections.csv"
+"""Folder in the run folder, and the table of the sections in it."""
 Follow = Callable[[str], None]
 
 
@@ -53,7 +51,6 @@ class ResolvedSlab:
         span: lower and upper plane, x in m.
         closed: which sides are walls.
         state: "initial" or "damaged".
-        digest: of the file of the spheres.
         across: cells across the mean radius of a fine, on the finer of two grids.
     """
 
@@ -61,7 +58,6 @@ class ResolvedSlab:
     span: tuple[float, float]
     closed: Walled
     state: str
-    digest: str
     across: float
 
     __repr__ = one_line
@@ -98,58 +94,17 @@ class ResolvedSlab:
         return int(np.prod(divide(self.edges, cells)))
 
 
-class KeptGrid(JsonObject):
-    """A solved grid in the file `GRIDS`: what was solved, and the fields of `StokesFlow`."""
-
-    state: str
-    x_lo_m: float
-    x_hi_m: float
-    cells: int
-    spheres: str
-    k: Positive
-    iterations: int
-    residual: float
-    seconds: float
-    unknowns: int
-
-
-def read_grids(path: Path) -> list[dict[str, Any]]:
-    """The solved grids of a run, none without the file. Raises CaseError for another content."""
-    if not path.is_file():
-        return []
-    try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(rows, list):
-            raise ValueError(f"{type(rows).__name__}, expected a list")
-        return [KeptGrid.model_validate(row).model_dump() for row in rows]
-    except (OSError, ValueError) as error:
-        raise CaseError(
-            f"{path}: cannot be read as solved grids ({error}); remove it, and its grids are "
-            "solved again"
-        ) from error
-
-
-def flow_through(slab: ResolvedSlab, cells: int, path: Path, follow: Follow) -> StokesFlow:
-    """The flow on one grid, out of the file at `path` or solved and added to it."""
-    key = {"state": slab.state, "x_lo_m": slab.span[0], "x_hi_m": slab.span[1]}
-    key |= {"cells": cells, "spheres": slab.digest}
-    rows, names = read_grids(path), [one.name for one in fields(StokesFlow)]
-    for row in rows:
-        if key.items() <= row.items():
-            return StokesFlow(**{name: row[name] for name in names})
+def flow_through(slab: ResolvedSlab, cells: int, follow: Follow) -> StokesFlow:
+    """The flow on one grid."""
     size = slab.size(cells)
     seconds = max(1.0, SECONDS[slab.state] * size / cores() ** 0.5)
     took = f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
     memory = BYTES * size / 2**30
     follow(f"{slab.words}: {size / 1e6:.1f} million cells, about {took} and {memory:.1f} GiB")
     with fft.set_workers(cores()):
-        flow = solve_slab(
+        return solve_slab(
             slab.spheres, slab.span, cells=cells, tolerance=K_TOLERANCE, closed=slab.closed
         )
-    rows.append(key | {name: getattr(flow, name) for name in names})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, json.dumps(rows, indent=1) + "\n")
-    return flow
 
 
 class StokesSection(JsonObject):
@@ -168,6 +123,10 @@ class StokesSection(JsonObject):
     cell_initial_m: float
     cell_damaged_m: float
 
+    def is_at(self, place: Mapping[str, float]) -> bool:
+        """Whether it has these numbers."""
+        return all(isclose(getattr(self, key), one, rel_tol=1e-6) for key, one in place.items())
+
 
 def stokes_sections(
     folder: Path,
@@ -178,8 +137,8 @@ def stokes_sections(
 ) -> list[dict[str, Any]]:
     """Sections of a finished run by resolved Stokes flow and by the network, each cut out.
 
-    They are written to the folder `KEPT_IN` of the run and to its report. Every solved grid is
-    kept there, so a cut computation goes on behind the last of them.
+    They are written to the folder `KEPT_IN` of the run and to its report. A section that stands
+    there, on the same grids, is not solved again.
 
     Args:
         folder: of the run.
@@ -204,24 +163,24 @@ def stokes_sections(
     with locked(open_run(folder).path):
         run = open_run(folder)
         slabs = _slabs(run, numbers, across)
-        grids, table = run.path / KEPT_IN / GRIDS, run.path / KEPT_IN / RESOLVED
-        read_sections(table)  # refuses a broken table before hours of solving
+        table = run.path / KEPT_IN / RESOLVED
         for before, *after in slabs:
-            row: dict[str, float] = {}
-            for slab in (before, *after) if after else (before, before):
-                name = "damaged" if row else "initial"
-                k = estimate(
-                    *(flow_through(slab, cells, grids, follow) for cells in slab.cells),
-                    with_fines=len(slab.spheres.fines()) > 0,
-                )
-                row |= {f"k_{name}_m2": k.k, f"k_{name}_error": k.error}
+            pair = {"initial": before, "damaged": after[0] if after else before}
+            row = {"x_lo_m": before.span[0], "x_hi_m": before.span[1]}
+            known = [one for one in read_sections(table) if not one.is_at(row)]
+            for name, slab in pair.items():
                 row[f"cell_{name}_m"] = float(slab.edges.max()) / slab.cells[1]
-            lo, hi = before.span
+            if any(one.is_at(row) for one in read_sections(table)):
+                continue
+            for name, slab in pair.items():
+                if name == "initial" or after:
+                    flows = [flow_through(slab, cells, follow) for cells in slab.cells]
+                    k = estimate(*flows, with_fines=len(slab.spheres.fines()) > 0)
+                row |= {f"k_{name}_m2": k.k, f"k_{name}_error": k.error}
             row["k_reduction"] = 1.0 - row["k_damaged_m2"] / row["k_initial_m2"]
-            others = [one for one in read_sections(table) if (one.x_lo_m, one.x_hi_m) != (lo, hi)]
-            every = [*others, StokesSection(x_lo_m=lo, x_hi_m=hi, **row)]
+            every = sorted([*known, StokesSection(**row)], key=lambda one: one.x_lo_m)
             table.parent.mkdir(exist_ok=True)
-            write_rows(table, [vars(one) for one in sorted(every, key=lambda one: one.x_lo_m)])
+            write_rows(table, [vars(one) for one in every])
         rows = with_network(read_sections(table), run.summary)
         if (run.path / "report.html").is_file():
             put_section(run.path / "report.html", STOKES, stokes_html(rows))
@@ -249,7 +208,6 @@ def _slabs(run: FinishedRun, numbers: Sequence[int], across: float) -> list[list
                 span=span,
                 closed=(False, not y, not z),
                 state=state,
-                digest=str(run.manifest.get("files", {}).get(f"spheres_{state}.csv", "")),
                 across=across,
             )
             for state, one in spheres.items()
