@@ -28,7 +28,11 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     """Turn the flow back, unless that is done. Raises what `clean_up` raises."""
     if is_done(session, STAGE):
         return
-    grains, flow, folder = packed_grains(session), back_flow(case), session.path / STAGE
+    grains, flow, folder = (
+        packed_grains(session.path, session.case),
+        back_flow(case),
+        session.path / STAGE,
+    )
     start = Start(
         grains=grains,
         invaded=invaded(session, case, grains, invasion_record(session, case)).damaged,

@@ -27,7 +27,6 @@ MANIFEST, CASE, LOCK, UNFINISHED = "manifest.json", "case.toml", ".lock", ".unfi
 MARK = ".fdnet-run"
 RECORDS: dict[str, str] = {stage: f"{stage}/stage.json" for stage in LIGGGHTS_STAGES}
 _MARK_TEXT = "fdnet run folder, format 1\n"
-_HALF_MARK = re.compile(r"\.\.fdnet-run\.\d+\.part")
 
 
 # ------------------------------------------------------------------------------------------------
@@ -263,12 +262,8 @@ def is_run_folder(folder: Path) -> bool:
 
 
 def is_unused(folder: Path) -> bool:
-    """Whether `folder` is empty but for the empty lock and half mark of a session just killed."""
-    return all(
-        (child.name == LOCK and child.is_file() and child.stat().st_size == 0)
-        or _HALF_MARK.fullmatch(child.name) is not None
-        for child in folder.iterdir()
-    )
+    """Whether `folder` is empty but for the empty lock of a session just killed."""
+    return all(child.name == LOCK and child.stat().st_size == 0 for child in folder.iterdir())
 
 
 _OWN = (CASE, MANIFEST, UNFINISHED, LOCK, MARK)
@@ -302,13 +297,9 @@ class RunFolder:
         """Mark a stage as done: its record is only there when the stage is complete."""
         _write_json(self.path / RECORDS[stage], record)
 
-    def manifest(self) -> dict[str, Any] | None:
-        """The manifest of the run, or None. Raises CaseError as `read_manifest` does."""
-        return read_manifest(self.path)
-
     def holds(self, case: Case, stages: tuple[str, ...]) -> bool:
-        """Whether all of `stages` are done. Raises CaseError as `manifest` and `record` do."""
-        manifest = self.manifest()
+        """Whether all of `stages` are done. Raises CaseError as `read_manifest` does."""
+        manifest = read_manifest(self.path)
         if manifest is not None:
             asked = [stage for stage in stages if stage in (*case.stages, "invade")]
             return set(asked) <= set(manifest["stages"])
@@ -489,7 +480,7 @@ def _admit(
             f"{folder.path}: holds an unfinished run; continue it with --resume or start over "
             "with --force"
         )
-    if force or folder.manifest() is None:
+    if force or read_manifest(folder.path) is None:
         write_text(folder.path / UNFINISHED, " ".join(stages) + "\n")
     if force or not written.exists() or not folder.holds(case, stages):
         write_text(written, case.toml())

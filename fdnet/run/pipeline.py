@@ -44,12 +44,12 @@ from fdnet.run.folder import (
     SOME_TABLES,
     START_OVER,
     TABLES,
-    RunFolder,
     check_files,
     check_finished,
     digests_of,
     frames_in,
     open_folder,
+    read_manifest,
 )
 from fdnet.run.outputs import (
     Results,
@@ -163,9 +163,10 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
     )
     try:
         session = Session(case=case, scales=scales_of(case), folder=folder, options=options)
-        if folder.manifest() is not None and folder.holds(case, options.stages):
+        if read_manifest(folder.path) is not None and folder.holds(case, options.stages):
             check_finished(folder.path)
-            return _read_summary(folder)
+            path = folder.path / "summary.json"
+            return tables.read_summary(path) if path.exists() else {}
         return _carry_out(session)
     except CaseError as error:
         left = folder.discard()
@@ -240,16 +241,11 @@ def _refused(check: Callable[..., object], *arguments: Any) -> Iterator[str]:
         yield str(error)
 
 
-def _read_summary(folder: RunFolder) -> dict[str, Any]:
-    path = folder.path / "summary.json"
-    return tables.read_summary(path) if path.exists() else {}
-
-
 def _carry_out(session: Session) -> dict[str, Any]:
     import fdnet.network.permeability  # noqa: F401  a library that is missing is named first
 
     stages = session.options.stages
-    if session.folder.manifest() is not None:
+    if read_manifest(session.path) is not None:
         session.folder.clear(tuple(stage for stage in ("analyse", "report") if stage in stages))
     else:  # a provisional analysis may be there
         session.folder.clear(("analyse", "report"))
@@ -321,7 +317,11 @@ def _analyse_and_report(session: Session, records: Records) -> dict[str, Any]:
 
 def _analysed(session: Session, records: Records) -> Results:
     """The specimen before, after the invasion if any, and after its clean-up if any."""
-    case, grains, record = session.case, packed_grains(session), records["invade"]
+    case, grains, record = (
+        session.case,
+        packed_grains(session.path, session.case),
+        records["invade"],
+    )
     laws = partial(with_default_laws, periodic=case.periodic, options=case.analysis)
     results = partial(Results, path=session.path, grains=grains)
     if record is None or not isinstance(case, InvasionCase):

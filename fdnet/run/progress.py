@@ -83,8 +83,6 @@ _NOTES = {
     "cleaned": "chunk {}",
 }
 """What the lines of a deck say, by their first word; a line without an entry says nothing."""
-_MOST_STEPS = 10**9
-"""Number of steps from which they are shown with three digits."""
 
 
 class Progress:
@@ -202,10 +200,10 @@ class Progress:
 
 
 def _short(number: str) -> str:
-    """A number with three digits, unless it is a count of usual size."""
+    """A whole number below 10^9 as it is, others with three digits; a word stays."""
+    if number.isdecimal() and len(number) < 10:
+        return number
     try:
-        return (
-            number if number.isdecimal() and int(number) < _MOST_STEPS else f"{float(number):.3g}"
-        )
+        return f"{float(number):.3g}"
     except ValueError:
         return number

@@ -257,19 +257,12 @@ class FinishedInvasion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
-    """How to run a case, as opposed to what it is.
+    """How to run a case, as opposed to what it is: the options of `fdnet run`.
 
     Attributes:
-        out: run folder.
-        ranks: MPI ranks of LIGGGHTS.
-        resume: continue an unfinished run.
-        force: replace what is there.
-        stages: stages to run, of "pack", "invade", "analyse" and "report".
-        liggghts: path of the binary; None: looked for.
         launcher: template that starts several ranks, as "srun -n {ranks}"; None: mpirun.
         pack_from: run folder whose finished pack is taken; None: the pack is made.
         timeout: s, after which LIGGGHTS is stopped in each stage; None: never.
-        show_progress: whether to write progress to standard error.
         command: command line that started the run, for its records.
         answered: takes the summary when the analysis is done, before the pictures are drawn.
     """
