@@ -17,19 +17,12 @@ if TYPE_CHECKING:
 
 
 class Step(NamedTuple):
-    """A layer of one permeability behind the formation face.
+    """A layer of one permeability behind the formation face."""
 
-    Attributes:
-        near: m, depth where it begins.
-        far: m, depth where it ends.
-        before: m2, permeability without fines.
-        after: m2, with fines.
-    """
-
-    near: float
-    far: float
-    before: float
-    after: float
+    near: float  # m, depth where it begins
+    far: float  # m, depth where it ends
+    before: float  # m2, permeability without fines
+    after: float  # m2, with fines
 
 
 # ------------------------------------------------------------------------------------------------
@@ -45,22 +38,16 @@ _TOUCH = 1e-9
 
 
 class Zone(NamedTuple):
-    """The damaged zone.
+    """The damaged zone."""
 
-    Attributes:
-        depth: m, where its deepest damaged layer ends; 0 without damage.
-        ratio: permeability of the zone with the fines over that without, layers in series; 1
-            without damage.
-        before: m2, permeability of the zone without the fines; None without damage.
-        after: m2, with the fines; None without damage.
-        open_end: whether the last layer of the specimen is damaged too, so that the damage may
-            reach further than the specimen.
-    """
-
-    depth: float = 0.0
+    depth: float = 0.0  # m, where its deepest damaged layer ends; 0 without damage
+    # permeability of the zone with the fines over that without, layers in series; 1 without damage
     ratio: float = 1.0
+    # m2, permeability of the zone without the fines; None without damage
     before: float | None = None
-    after: float | None = None
+    after: float | None = None  # m2, with the fines; None without damage
+    # whether the last layer of the specimen is damaged too, so that the damage may reach further
+    # than the specimen
     open_end: bool = False
 
 
@@ -308,21 +295,13 @@ SOURCE = "docs/thesis/results.csv"
 
 
 class Scatter(NamedTuple):
-    """One standard deviation of a single run, pooled over `cases` whose seeds were repeated.
+    """One standard deviation of a single run, pooled over `cases` whose seeds were repeated."""
 
-    Attributes:
-        depth: of the depth of 95 % of the fines, over its mean.
-        loss: of the share of permeability that the sand loses at the face; a difference.
-        runs: number of runs.
-        cases: what was repeated.
-        source: where the results are, in words.
-    """
-
-    depth: float
-    loss: float
-    runs: int
-    cases: tuple[str, ...]
-    source: str
+    depth: float  # of the depth of 95 % of the fines, over its mean
+    loss: float  # of the share of permeability that the sand loses at the face; a difference
+    runs: int  # number of runs
+    cases: tuple[str, ...]  # what was repeated
+    source: str  # where the results are, in words
 
 
 QUICK = Scatter(

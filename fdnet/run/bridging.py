@@ -26,23 +26,14 @@ COUNTS = ("throats", "with_fines", "blocked", "clogged", "closed")
 
 
 class OpenThroats(NamedTuple):
-    """T open throats and what the fines do to them.
+    """T open throats and what the fines do to them."""
 
-    Attributes:
-        width: (T,) m, diameter.
-        fine: (T,) m, mean diameter of the fines in it; 0 where it holds none.
-        held: (T,) whether it holds a fine.
-        blocked: (T,) whether one fine covers its whole cross-section.
-        left: (T,) conductance over the clean one; 1 where that is 0.
-        between: (T,) whether it lies between three grains, and not at a wall or an end face.
-    """
-
-    width: Array
-    fine: Array
-    held: Array
-    blocked: Array
-    left: Array
-    between: Array
+    width: Array  # (T,) m, diameter
+    fine: Array  # (T,) m, mean diameter of the fines in it; 0 where it holds none
+    held: Array  # (T,) whether it holds a fine
+    blocked: Array  # (T,) whether one fine covers its whole cross-section
+    left: Array  # (T,) conductance over the clean one; 1 where that is 0
+    between: Array  # (T,) whether it lies between three grains, and not at a wall or an end face
 
     def where(self, use: Array) -> "OpenThroats":
         """The throats of a mask (T,)."""

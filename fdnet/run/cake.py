@@ -32,17 +32,11 @@ LAW = "beetstra"
 
 
 class Standing(NamedTuple):
-    """The fines of a cake, and what each resists.
+    """The fines of a cake, and what each resists."""
 
-    Attributes:
-        fines: N fines.
-        resistance: (N,) 1/m of each; of the cake it is their sum.
-        thickness: m, from the face to the foremost fine.
-    """
-
-    fines: Snapshot
-    resistance: Array
-    thickness: float
+    fines: Snapshot  # N fines
+    resistance: Array  # (N,) 1/m of each; of the cake it is their sum
+    thickness: float  # m, from the face to the foremost fine
 
 
 def standing_cake(spheres: Snapshot, periodic: Sequence[bool]) -> Standing:
@@ -64,21 +58,13 @@ def standing_cake(spheres: Snapshot, periodic: Sequence[bool]) -> Standing:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Cake:
-    """The cake in B slices of a mean diameter, from its front to the formation face.
+    """The cake in B slices of a mean diameter, from its front to the formation face."""
 
-    Attributes:
-        edges: (B+1,) m, x; the last is the face.
-        count: (B,) number of fines centred in the slice.
-        porosity: (B,) void over volume.
-        diameter: (B,) m, Sauter mean of these fines.
-        resistance: (B,) 1/m.
-    """
-
-    edges: Array
-    count: Array
-    porosity: Array
-    diameter: Array
-    resistance: Array
+    edges: Array  # (B+1,) m, x; the last is the face
+    count: Array  # (B,) number of fines centred in the slice
+    porosity: Array  # (B,) void over volume
+    diameter: Array  # (B,) m, Sauter mean of these fines
+    resistance: Array  # (B,) 1/m
 
     __repr__ = one_line
 

@@ -71,19 +71,12 @@ def fluid_turned_back(flow: BackFlow, grains: Snapshot) -> DrivingFluid | None:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Returned:
-    """What a clean-up gave.
+    """What a clean-up gave."""
 
-    Attributes:
-        state: grains and remaining fines at the end.
-        analysis: of this state, with the damage law that the invasion was measured by.
-        before: (N,) depth of the fines inside before, m.
-        stayed: (N,) whether each of them is still inside.
-    """
-
-    state: Snapshot
-    analysis: "Analysis"
-    before: Array
-    stayed: Array
+    state: Snapshot  # grains and remaining fines at the end
+    analysis: "Analysis"  # of this state, with the damage law that the invasion was measured by
+    before: Array  # (N,) depth of the fines inside before, m
+    stayed: Array  # (N,) whether each of them is still inside
 
 
 def returned(session: Session, case: InvasionCase, grains: Snapshot) -> Snapshot:

@@ -68,13 +68,9 @@ _TURN = np.array([-1.0, 1.0, 1.0])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mirrored:
-    """The fluid of a mirrored specimen, as it acts on the specimen itself.
+    """The fluid of a mirrored specimen, as it acts on the specimen itself."""
 
-    Attributes:
-        fluid: flows along x through the mirrored specimen.
-    """
-
-    fluid: DrivingFluid
+    fluid: DrivingFluid  # flows along x through the mirrored specimen
 
     def keep(self, path: Path) -> None:
         """Nothing: the flow turns back in cases of spheres alone."""
@@ -109,17 +105,11 @@ PARTS = 4
 
 
 class Movers(NamedTuple):
-    """N fines that move.
+    """N fines that move."""
 
-    Attributes:
-        position: (N, 3) m.
-        velocity: (N, 3) m/s.
-        rate: (N,) 1/s, drag coefficient over mass.
-    """
-
-    position: Array
-    velocity: Array
-    rate: Array
+    position: Array  # (N, 3) m
+    velocity: Array  # (N, 3) m/s
+    rate: Array  # (N,) 1/s, drag coefficient over mass
 
     def after(self, time: float, fluid: Array) -> "Movers":
         """The same after `time` s in a `fluid` of constant velocity (N, 3) m/s.
@@ -224,20 +214,14 @@ STANDING = 0.5
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NetworkFluid:
-    """The fluid in a pack whose pores the fines fill.
+    """The fluid in a pack whose pores the fines fill."""
 
-    Attributes:
-        case: what is run.
-        scales: of the case.
-        grains: of the pack, fixed.
-        standing: share of the velocity given below which a fine belongs to the deposit.
-        renewed: share of the deposit that may change before the network is solved anew.
-    """
-
-    case: InvasionCase
-    scales: InvasionScales
-    grains: Snapshot
+    case: InvasionCase  # what is run
+    scales: InvasionScales  # of the case
+    grains: Snapshot  # of the pack, fixed
+    # share of the velocity given below which a fine belongs to the deposit
     standing: float = STANDING
+    # share of the deposit that may change before the network is solved anew
     renewed: float = RENEWED
 
     @property

@@ -272,19 +272,12 @@ _OWN = (CASE, MANIFEST, UNFINISHED, LOCK, MARK)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFolder:
-    """A run folder whose lock this process holds.
+    """A run folder whose lock this process holds."""
 
-    Attributes:
-        path: of the folder.
-        lock: descriptor of the locked file.
-        was_empty: whether it was empty, or not there, before.
-        made: folders that were made for it, innermost first.
-    """
-
-    path: Path
-    lock: int
-    was_empty: bool
-    made: tuple[Path, ...]
+    path: Path  # of the folder
+    lock: int  # descriptor of the locked file
+    was_empty: bool  # whether it was empty, or not there, before
+    made: tuple[Path, ...]  # folders that were made for it, innermost first
 
     def record(self, stage: str) -> dict[str, Any] | None:
         """The record of a finished stage ("pack", "invade"), or None.

@@ -39,28 +39,18 @@ MOST_FRAMES = 24
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Results:
-    """The results of a run and where they go.
+    """The results of a run and where they go."""
 
-    Attributes:
-        path: run folder.
-        grains: as packed.
-        invasion: None when the case has no fines.
-        analysis: permeability, porosity and fines of the specimen.
-        sizes: of grains and fines with measured curves.
-        cleaned: what the clean-up gave; None without one.
-        added: results that only some runs have.
-        numbers: of the summary, that only size classes give.
-        finer: fines of classes beside the spheres of LIGGGHTS; None without any.
-    """
-
-    path: Path
-    grains: Snapshot
-    invasion: FinishedInvasion | None
-    analysis: "Analysis"
-    sizes: tuple[PlacedSizes, ...] = ()
-    cleaned: Returned | None = None
-    added: tuple[Added, ...] = ()
+    path: Path  # run folder
+    grains: Snapshot  # as packed
+    invasion: FinishedInvasion | None  # None when the case has no fines
+    analysis: "Analysis"  # permeability, porosity and fines of the specimen
+    sizes: tuple[PlacedSizes, ...] = ()  # of grains and fines with measured curves
+    cleaned: Returned | None = None  # what the clean-up gave; None without one
+    added: tuple[Added, ...] = ()  # results that only some runs have
+    # of the summary, that only size classes give
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    # fines of classes beside the spheres of LIGGGHTS; None without any
     finer: Snapshot | None = None
 
     @property

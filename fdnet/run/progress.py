@@ -27,20 +27,13 @@ part of it that is left; and steps that are expected beyond the forecast, over t
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forecast:
-    """What is known of a stage before it, in steps of its first length.
+    """What is known of a stage before it, in steps of its first length."""
 
-    Attributes:
-        expected: at which it is expected to end.
-        plug: without a crossing of the face, after which it ends; 0 without such a rule.
-        cap: at which it ends at the latest; None without such a step.
-        allowed: crossings a step that the rule lets pass.
-        chunk: steps of a chunk, where later chunks may take more; 0 where all steps are alike.
-    """
-
-    expected: int
-    plug: int = 0
-    cap: int | None = None
-    allowed: float = 0.0
+    expected: int  # at which it is expected to end
+    plug: int = 0  # without a crossing of the face, after which it ends; 0 without such a rule
+    cap: int | None = None  # at which it ends at the latest; None without such a step
+    allowed: float = 0.0  # crossings a step that the rule lets pass
+    # steps of a chunk, where later chunks may take more; 0 where all steps are alike
     chunk: int = 0
 
     def end(self, seen: Sequence[tuple[int, int]]) -> int:

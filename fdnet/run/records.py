@@ -232,22 +232,15 @@ def processor_seconds(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FinishedInvasion:
-    """A finished invasion.
+    """A finished invasion."""
 
-    Attributes:
-        case: what was run.
-        scales: of the case.
-        history: one row a checkpoint.
-        damaged: grains and all remaining fines at the end.
-        updates: the record of a coupled invasion, one row an update; empty of others.
-        rows: of history.csv, where the fast model made it; empty of others.
-    """
-
-    case: InvasionCase
-    scales: InvasionScales
-    history: tuple[Checkpoint, ...]
-    damaged: Snapshot
+    case: InvasionCase  # what was run
+    scales: InvasionScales  # of the case
+    history: tuple[Checkpoint, ...]  # one row a checkpoint
+    damaged: Snapshot  # grains and all remaining fines at the end
+    # the record of a coupled invasion, one row an update; empty of others
     updates: tuple[Mapping[str, float], ...] = ()
+    # of history.csv, where the fast model made it; empty of others
     rows: tuple[dict[str, float], ...] = ()
 
 
@@ -257,15 +250,7 @@ class FinishedInvasion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
-    """How to run a case, as opposed to what it is: the options of `fdnet run`.
-
-    Attributes:
-        launcher: template that starts several ranks, as "srun -n {ranks}"; None: mpirun.
-        pack_from: run folder whose finished pack is taken; None: the pack is made.
-        timeout: s, after which LIGGGHTS is stopped in each stage; None: never.
-        command: command line that started the run, for its records.
-        answered: takes the summary when the analysis is done, before the pictures are drawn.
-    """
+    """How to run a case, as opposed to what it is: the options of `fdnet run`."""
 
     out: Path
     ranks: int = 1
@@ -273,11 +258,14 @@ class RunOptions:
     force: bool = False
     stages: tuple[str, ...] = STAGES
     liggghts: str | None = None
+    # template that starts several ranks, as "srun -n {ranks}"; None: mpirun
     launcher: str | None = None
+    # run folder whose finished pack is taken; None: the pack is made
     pack_from: Path | None = None
-    timeout: float | None = None
+    timeout: float | None = None  # s, after which LIGGGHTS is stopped in each stage; None: never
     show_progress: bool = True
-    command: str = ""
+    command: str = ""  # command line that started the run, for its records
+    # takes the summary when the analysis is done, before the pictures are drawn
     answered: Callable[[Mapping[str, Any]], None] = lambda summary: None
 
     def __post_init__(self) -> None:
@@ -306,22 +294,15 @@ def most_ranks() -> int:
 
 @dataclass(slots=True)
 class Session:
-    """A run while it goes on.
+    """A run while it goes on."""
 
-    Attributes:
-        case: what is run.
-        scales: of the case.
-        folder: where it is run; this process holds its lock.
-        options: how it is run.
-        seconds: s, that each stage took in this session.
-        cpu_seconds: s of processors, that this process spent on each of them.
-    """
-
-    case: Case
-    scales: Scales
-    folder: RunFolder
-    options: RunOptions
+    case: Case  # what is run
+    scales: Scales  # of the case
+    folder: RunFolder  # where it is run; this process holds its lock
+    options: RunOptions  # how it is run
+    # s, that each stage took in this session
     seconds: dict[str, float] = field(default_factory=dict)
+    # s of processors, that this process spent on each of them
     cpu_seconds: dict[str, float] = field(default_factory=dict)
     _binary: Binary | None = None
 

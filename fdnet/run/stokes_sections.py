@@ -44,21 +44,13 @@ Follow = Callable[[str], None]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ResolvedSlab:
-    """Spheres between two planes.
+    """Spheres between two planes."""
 
-    Attributes:
-        spheres: those that reach into it.
-        span: lower and upper plane, x in m.
-        closed: which sides are walls.
-        state: "initial" or "damaged".
-        across: cells across the mean radius of a fine, on the finer of two grids.
-    """
-
-    spheres: Snapshot
-    span: tuple[float, float]
-    closed: Walled
-    state: str
-    across: float
+    spheres: Snapshot  # those that reach into it
+    span: tuple[float, float]  # lower and upper plane, x in m
+    closed: Walled  # which sides are walls
+    state: str  # "initial" or "damaged"
+    across: float  # cells across the mean radius of a fine, on the finer of two grids
 
     __repr__ = one_line
 
