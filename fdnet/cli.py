@@ -11,7 +11,6 @@ import os
 import shlex
 import signal
 import sys
-import threading
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
@@ -32,8 +31,6 @@ FORMER = {
 """What took the place of commands that are gone."""
 
 _STOPPED = 130
-_PATIENCE = 0.2
-"""Seconds after which a stop that was lost is sent once more."""
 _SIGNALS: list[int] = []
 """Signals to stop that have arrived."""
 
@@ -45,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
     whole = arguments is None
-    _listen_for_stops(whole=whole)
+    _listen_for_stops()
     try:
         options = _parsed(given)
         options.command_line = shlex.join(["fdnet", *given])
@@ -58,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except FdnetError as error:
         if debug:
             raise
-        print(f"fdnet: {_one_line(error)}", file=sys.stderr)
+        print("fdnet:", *str(error).split(), file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
         return _stopped(whole=whole)
@@ -91,39 +88,16 @@ def _stopped(*, whole: bool) -> int:
     return _STOPPED
 
 
-def _listen_for_stops(*, whole: bool) -> None:
-    """Ctrl-C, unless the shell has switched it off, and the end that a queue asks for.
-
-    Where this is the `whole` process, also those that are lost on their way.
-    """
+def _listen_for_stops() -> None:
+    """Ctrl-C, unless the shell has switched it off, and the end that a queue asks for."""
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
-    if whole:
-        sys.unraisablehook = _stop_again
 
 
 def _interrupt(number: int, *_: Any) -> NoReturn:
     _SIGNALS.append(number)
     raise KeyboardInterrupt
-
-
-def _stop_again(lost: Any) -> None:
-    """Sends a stop once more that arrived where nothing can be raised, as in a call-back.
-
-    Other such errors are shown as Python shows them, unless a stop has made them.
-    """
-    if issubclass(lost.exc_type, KeyboardInterrupt):
-        main_thread = (threading.main_thread().ident, signal.SIGINT)
-        again = threading.Timer(_PATIENCE, signal.pthread_kill, main_thread)
-        again.daemon = True
-        again.start()
-    elif not _SIGNALS:
-        sys.__unraisablehook__(lost)
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
 
 
 def _parsed(given: Sequence[str]) -> argparse.Namespace:

@@ -192,21 +192,13 @@ class Doubt(str):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """One kind of warning.
+    """One kind of warning."""
 
-    Attributes:
-        key: its place on the page.
-        follows: what follows.
-        do: what to do.
-        read: page of the documentation.
-        says: which of "follows" and "do" the warning says itself.
-    """
-
-    key: str
-    follows: str
-    do: str
-    read: str
-    says: tuple[str, ...] = ()
+    key: str  # its place on the page
+    follows: str  # what follows
+    do: str  # what to do
+    read: str  # page of the documentation
+    says: tuple[str, ...] = ()  # which of "follows" and "do" the warning says itself
 
 
 @cache

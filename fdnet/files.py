@@ -10,13 +10,13 @@ import shutil
 import stat
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from fdnet.errors import CaseError
 
 _FULL_BYTES = 1 << 16
-_PART = re.compile(r"\..+\.(\d+)\.part(\.[^.]*)?")
+_PART = re.compile(r"\..+\.\d+\.part(\.[^.]*)?")
 """The temporary name of a file; the number is that of the process that writes it."""
 
 
@@ -34,41 +34,20 @@ def remove_half_written(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def _temporary(final: Path, process: object) -> Path:
-    return final.with_name(f".{final.stem}.{process}.part{final.suffix}")
-
-
-def _is_running(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        pass
-    return True
-
-
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
     """Give a name in the folder of `path` to write to; on leaving without error it becomes `path`.
 
     The temporary name is hidden, holds the process id and keeps the suffix (VTK chooses the format
-    by it). When the body raises, the temporary file is removed and `path` stays as it was. What a
-    process that was killed left of the same file is removed first. Raises CaseError where a
-    device, a pipe or a folder has the name.
+    by it). When the body raises, the temporary file is removed and `path` stays as it was. Raises
+    CaseError where a device, a pipe or a folder has the name.
     """
     final = Path(path)
     if final.exists() and not final.is_file():
         raise CaseError(
             f"{final}: is no ordinary file (a folder, a device or a pipe); give another"
         )
-    with suppress(OSError):
-        for left in final.parent.iterdir():
-            match = _PART.fullmatch(left.name)
-            ours = match is not None and _temporary(final, match.group(1)) == left
-            if match is not None and ours and not _is_running(int(match.group(1))):
-                left.unlink(missing_ok=True)
-    part = _temporary(final, os.getpid())
+    part = final.with_name(f".{final.stem}.{os.getpid()}.part{final.suffix}")
     try:
         yield part
         os.replace(part, final)

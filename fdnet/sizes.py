@@ -36,15 +36,10 @@ class Law(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class LogNormal(Law):
-    """ln d is normal, with the mean ln `median` and the standard deviation `spread`.
+    """ln d is normal, with the mean ln `median` and the standard deviation `spread`."""
 
-    Attributes:
-        median: m.
-        spread: natural logarithm of the geometric standard deviation.
-    """
-
-    median: float
-    spread: float
+    median: float  # m
+    spread: float  # natural logarithm of the geometric standard deviation
 
     def cells(self, power: float, edges: Array) -> Array:
         """exp(p mu + p^2 s^2 / 2) times the normal distribution shifted by p s^2.
@@ -71,15 +66,10 @@ class LogNormal(Law):
 
 @dataclass(frozen=True, slots=True)
 class RosinRammler(Law):
-    """F = 1 - exp(-(d / scale)^exponent) (Rosin and Rammler 1933, Weibull).
+    """F = 1 - exp(-(d / scale)^exponent) (Rosin and Rammler 1933, Weibull)."""
 
-    Attributes:
-        scale: m, the diameter that 63.2 % are finer than.
-        exponent: the larger, the narrower.
-    """
-
-    scale: float
-    exponent: float
+    scale: float  # m, the diameter that 63.2 % are finer than
+    exponent: float  # the larger, the narrower
 
     def cells(self, power: float, edges: Array) -> Array:
         """scale^p times the integral of u^(p/n) exp(-u) du, u = (d / scale)^n.
@@ -103,15 +93,10 @@ class RosinRammler(Law):
 
 @dataclass(frozen=True, slots=True)
 class Uniform(Law):
-    """All diameters between two ends are equally frequent.
+    """All diameters between two ends are equally frequent."""
 
-    Attributes:
-        low: m, smallest diameter.
-        high: m, largest diameter.
-    """
-
-    low: float
-    high: float
+    low: float  # m, smallest diameter
+    high: float  # m, largest diameter
 
     def cells(self, power: float, edges: Array) -> Array:
         """Integral of d^p over the width of the range."""
@@ -127,15 +112,11 @@ class Uniform(Law):
 
 @dataclass(frozen=True, slots=True)
 class Points(Law):
-    """Measured points, joined by straight lines over ln d (as on the usual paper).
+    """Measured points, joined by straight lines over ln d (as on the usual paper)."""
 
-    Attributes:
-        size: m, diameters that rise.
-        finer: shares (0 to 1) that are finer than each, which rise to 1. A first share above 0
-            is finer than the smallest size, by how much is not known.
-    """
-
-    size: tuple[float, ...]
+    size: tuple[float, ...]  # m, diameters that rise
+    # shares (0 to 1) that are finer than each, which rise to 1. A first share above 0 is finer
+    # than the smallest size, by how much is not known
     finer: tuple[float, ...]
 
     @property
@@ -186,23 +167,14 @@ when its shares by volume are sought."""
 
 @dataclass(frozen=True, eq=False)
 class SizeCurve:
-    """Diameters of spheres between two ends.
+    """Diameters of spheres between two ends."""
 
-    Attributes:
-        law: of the whole, beyond the ends too.
-        by: the power of d by which `law` counts: 0 number, 2 surface, 3 volume.
-        low: m, smallest diameter.
-        high: m, largest diameter.
-        below: share of the solids, by volume, that is finer than `low` and left out.
-        above: share that is coarser than `high` and left out.
-    """
-
-    law: Law
-    by: int
-    low: float
-    high: float
-    below: float = 0.0
-    above: float = 0.0
+    law: Law  # of the whole, beyond the ends too
+    by: int  # the power of d by which `law` counts: 0 number, 2 surface, 3 volume
+    low: float  # m, smallest diameter
+    high: float  # m, largest diameter
+    below: float = 0.0  # share of the solids, by volume, that is finer than `low` and left out
+    above: float = 0.0  # share that is coarser than `high` and left out
 
     @cached_property
     def edges(self) -> Array:
@@ -271,15 +243,10 @@ class SizeCurve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blend(Law):
-    """Several solids together, as a law that counts by volume.
+    """Several solids together, as a law that counts by volume."""
 
-    Attributes:
-        shares: of each part by volume; they sum to 1.
-        parts: the curve of each.
-    """
-
-    shares: tuple[float, ...]
-    parts: tuple[SizeCurve, ...]
+    shares: tuple[float, ...]  # of each part by volume; they sum to 1
+    parts: tuple[SizeCurve, ...]  # the curve of each
 
     @property
     def knots(self) -> tuple[float, ...]:
@@ -404,17 +371,11 @@ LOG_NORMAL, ROSIN_RAMMLER = "log-normal", "rosin-rammler"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """A law through some points.
+    """A law through some points."""
 
-    Attributes:
-        name: "log-normal" or "rosin-rammler".
-        law: the law.
-        misfit: by point, the diameter of the law over the given one, less 1.
-    """
-
-    name: str
-    law: LogNormal | RosinRammler
-    misfit: dict[float, float]
+    name: str  # "log-normal" or "rosin-rammler"
+    law: LogNormal | RosinRammler  # the law
+    misfit: dict[float, float]  # by point, the diameter of the law over the given one, less 1
 
     @property
     def worst(self) -> float:

@@ -35,8 +35,7 @@ NOW_AND_THEN = {
     ),  # the fast model
     *("k_moved_m2", "sizes", "skin", "skin_flow_lost", "skin_well_radius_m", "drag_updates"),
     *("drag_last_update", "rate_over_initial", "filtrate_m3", "cake_resistance_share"),
-    *("momentum_defect_most", "spurt_m3_m2", "volume_30min_m3_m2", "filtrate_fit"),
-    *("return_k_over_k0", "k_returned_m2", "clean_up"),
+    *("momentum_defect_most", "return_k_over_k0", "k_returned_m2", "clean_up"),
     *("cpu_seconds", "peak_memory_bytes", "share_done"),
 }
 """Keys of summary.json that a tiny run does not have."""

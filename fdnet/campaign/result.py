@@ -19,7 +19,7 @@ from fdnet.errors import CaseError
 from fdnet.files import replacing, write_text
 from fdnet.report.tables import read_summary
 from fdnet.run.folder import MANIFEST, check_finished, is_run_folder, read_record
-from fdnet.run.records import stage_costs
+from fdnet.run.records import processor_seconds
 from fdnet.statistics.bands import Band, student_band
 from fdnet.statistics.differences import Difference, difference, holm
 
@@ -205,7 +205,7 @@ def gather_plan(path: Path, plan: Plan, *, ranked_by: str = RANKED_BY) -> Compar
         entries.append(Entry(job.name, *of_case, job.case.digest("pack"), numbers, *state))
     digests = dict.fromkeys(plan.packs.values())
     packs = [read_record(path / PACKS / digest, "pack") for digest in digests]
-    shared = sum(stage_costs(packs, {})["cpu_seconds"].values())
+    shared = sum(processor_seconds(packs, {}).values())
     keys, runs_of = dict.fromkeys(key for v in plan.variants for key in v.keys), tuple(entries)
     made = Comparison(plan.name, path, tuple(keys), runs_of, ranked_by, packs_s=shared)
     return refuse_unknown(made, ranked_by, "--rank-by")

@@ -146,17 +146,19 @@ class ClassInvasion:
     state: PackState
 
 
-def velocity_in(course: Course, k_over_k0: float, cake: float) -> float:
-    """Superficial velocity, m/s, with a cake of resistance `cake` 1/m.
+def velocity_in(
+    first: float, rest: float, k_over_k0: float, more: float, gain: float = 0.0
+) -> float:
+    """Superficial velocity U, m/s, at constant pressure; U0 is the `first`.
 
-    At constant pressure U = U0 (1 + rest) / (k0 / k + rest + cake / R0).
+    With the resistance R0 = mu L / k0 of the intact pack, the way beyond it resists with `rest`,
+    cake and moving fines with `more`, over R0, and fines that move give back `gain`, over R0:
+
+        U = (U0 (1 + rest) + gain) / (k0 / k + rest + more).
     """
-    if course.at_rate:
-        return course.velocity
     if k_over_k0 <= 0:
         return 0.0
-    resistance = 1.0 / k_over_k0 + course.rest + cake / course.resistance
-    return course.velocity * (1.0 + course.rest) / resistance
+    return (first * (1.0 + rest) + gain) / (1.0 / k_over_k0 + rest + more)
 
 
 def cake_resistance(
@@ -180,7 +182,10 @@ def invade_classes(
     state = flow_with(kept)
     for _ in range(MOST_STEPS):
         cake = cake_resistance(course.cake_permeability, sieve, solids, classes)
-        velocity = velocity_in(course, state.k_over_k0, cake)
+        velocity = course.velocity
+        if not course.at_rate:
+            more = cake / course.resistance
+            velocity = velocity_in(velocity, course.rest, state.k_over_k0, more)
         rows.append(_row(course, sieve, solids, time, filtrate, velocity, state.k_over_k0, cake))
         by_class.append([solids.inside_by_class, solids.passed, solids.cake])
         reason = reason or ("plugged" if velocity <= 0 else "")

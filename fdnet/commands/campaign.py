@@ -27,7 +27,8 @@ _ENGINE = (
 )
 _DRY = (
     "--dry-run",
-    "run and write nothing; print how long the runs take, and what they leave out",
+    "run and write nothing; print how long the runs take, what they leave out, and what would "
+    "start them",
 )
 
 
@@ -92,13 +93,17 @@ def _run_campaign(
     from fdnet.campaign.api import carry_out
     from fdnet.campaign.plan import plan_lines
 
+    how = _how_of(options)
     if options.dry_run:
-        print("\n".join(plan_lines(plan)))
+        by = "fdnet itself" if how.engine == "local" else "Snakemake"
+        by = f"Slurm with {', '.join(how.resources)}" if how.engine == "slurm" else by
+        way = f"would run in {options.out}: {how.jobs} at a time, by {by}"
+        print(*plan_lines(plan), way, sep="\n")
         return 0
     comparison = carry_out(
         Path(options.out),
         plan,
-        _how_of(options),
+        how,
         options.until,
         options.rank_by,
         most_seeds=options.max_seeds,

@@ -24,12 +24,8 @@ def add_commands_on_runs(commands: Any) -> None:
     about = "draw the invasion of a finished run as a movie, or a picture of before and after"
     movie = new_command(commands, "movie", _movie, about, "fdnet movie runs/mine --show flux")
     movie.add(OUTPUT, "run RUN", "run folder", path_option)
-    what = (
-        "the fines alone (default), or with them the flux of every throat, or streamlines (half a "
-        "minute and more)"
-    )
-    shown = ("fines", "flux", "streamlines")
-    movie.add(THE_PICTURE, "--show", what, default="fines", choices=shown)
+    what = "the fines alone (default), or with them the flux of every throat"
+    movie.add(THE_PICTURE, "--show", what, default="fines", choices=("fines", "flux"))
     movie.add(THE_PICTURE, "--fps N", "frames a second (default 4)", float, 4.0)
     file = (
         "the movie, .gif or .mp4 (default RUN/invasion.gif), or one picture of before and after, "
@@ -46,7 +42,7 @@ def _movie(options: argparse.Namespace) -> int:
         options.run,
         options.out,
         per_second=options.fps,
-        show=options.show,
+        flux=options.show == "flux",
         force=options.force,
         progress=not options.quiet,
     )

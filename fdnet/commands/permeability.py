@@ -2,13 +2,12 @@
 
 import argparse
 import re
-import time
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.commands.options import OUTPUT, THE_FLOW, THE_SPHERES, new_command
+from fdnet.commands.options import THE_FLOW, THE_SPHERES, new_command
 from fdnet.errors import CaseError, Doubt, explained
 from fdnet.files import path_option
 from fdnet.names import (
@@ -17,7 +16,6 @@ from fdnet.names import (
     DAMAGE_LAW_NAMES,
     DEFAULT_LAW,
     LAW_NAMES,
-    MOST_SECTIONS,
     MOST_SPHERES,
     SECTION_ARCHIE,
     WALL_NAMES,
@@ -28,11 +26,9 @@ from fdnet.names import (
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
     from fdnet.spheres.readers import SphereFile
-    from fdnet.spheres.snapshot import Snapshot
 
 UNITS = ("m", "cm", "mm", "um")
 ALL_AXES = "all"
-_LAWS_START = b"law,damage_law,"
 
 
 def add_permeability(commands: Any) -> None:
@@ -59,15 +55,17 @@ def add_permeability(commands: Any) -> None:
         "--box x0,x1,y0,y1,z0,z1",
         "the specimen, in the unit of the file (default: the box of the dump, else the box around "
         "all grains)",
+        _box,
     )
     smaller = "spheres of a smaller radius are fines, in the unit of the file"
     spheres("--fines-below RADIUS", smaller, float)
     types = "which types of a dump are grains and which fines (default 1=grain,2=fine)"
-    spheres("--types TYPE=KIND,...", types)
+    spheres("--types TYPE=KIND,...", types, _types)
     spheres(
         "--periodic DIRS",
         "periodic directions of the file, any of x, y, z together; others are walls (default: "
         "those of the dump's BOX BOUNDS, else none; '' for none)",
+        _directions,
     )
     axes = "flow direction; all: the three one after another (default x)"
     flow("--axis", axes, default="x", choices=("x", "y", "z", ALL_AXES))
@@ -78,7 +76,7 @@ def add_permeability(commands: Any) -> None:
         default="no-slip",
         choices=WALL_NAMES,
     )
-    flow("--sections N", "slabs along the flow (default 1)", _count, 1)
+    flow("--sections N", "slabs along the flow (default 1)", int, 1)
     flow("--law", f"conductance law (default {DEFAULT_LAW})", choices=LAW_NAMES)
     flow(
         "--damage-law",
@@ -87,44 +85,10 @@ def add_permeability(commands: Any) -> None:
         choices=DAMAGE_LAW_NAMES,
     )
     flow("--compare-laws", "all laws with all damage laws as a table")
-    parser.add(OUTPUT, "--csv FILE", "write the laws, one row each, as CSV", path_option)
     parser.share("--json")
 
 
-def _count(text: str) -> int:
-    if not text.isdecimal() or len(text) > 18 or not 1 <= int(text) <= MOST_SECTIONS:
-        raise argparse.ArgumentTypeError(f"{text[:40]!r}, expected 1 to {MOST_SECTIONS}")
-    return int(text)
-
-
-def table_file(path: Path, spheres: Path) -> Path:
-    """The file that the table of laws is written to, without links.
-
-    Raises CaseError where that would replace the file of spheres, or anything but such a table.
-    """
-    target = path.resolve()
-    if not target.parent.is_dir():
-        raise CaseError(f"--csv: {path.parent} is not a folder; make it first")
-    if not target.exists():
-        return target
-    if not target.is_file():
-        raise CaseError(
-            f"--csv: {path} is no ordinary file (a folder, a device or a pipe); give the name of "
-            "a file, or print with --json"
-        )
-    if spheres.exists() and target.samefile(spheres):
-        raise CaseError(f"--csv: {path} is the file of spheres itself; give another name")
-    with target.open("rb") as file:
-        start = file.read(len(_LAWS_START))
-    if start not in (b"", _LAWS_START):
-        raise CaseError(
-            f"--csv: {path} is there already and is no table of laws; give another name (nothing "
-            "was changed)"
-        )
-    return target
-
-
-def directions_of(text: str) -> tuple[bool, bool, bool]:
+def _directions(text: str) -> tuple[bool, bool, bool]:
     from fdnet.spheres.snapshot import periodic_axes
 
     try:
@@ -133,7 +97,7 @@ def directions_of(text: str) -> tuple[bool, bool, bool]:
         raise CaseError(f"--{error}") from error
 
 
-def box_of(text: str) -> list[float]:
+def _box(text: str) -> list[float]:
     from fdnet.spheres.snapshot import checked_box
 
     try:
@@ -145,16 +109,15 @@ def box_of(text: str) -> list[float]:
         ) from error
 
 
-def types_of(text: str) -> dict[int, str]:
+def _types(text: str) -> dict[int, str]:
     pairs = [part.partition("=") for part in text.split(",")]
-    if not all(
-        number.strip().isdecimal() and len(number) < 10 and name.strip()
-        for number, _, name in pairs
-    ):
-        raise CaseError(f"--types: {text!r}, expected TYPE=KIND,..., for example 1=grain,2=fine")
-    if len({int(number) for number, _, _ in pairs}) < len(pairs):
-        raise CaseError(f"--types: {text!r} names a type twice")
-    return {int(number): name.strip() for number, _, name in pairs}
+    with suppress(ValueError):
+        types = {int(number): name.strip() for number, _, name in pairs}
+        if len(types) == len(pairs) and all(types.values()):
+            return types
+    raise CaseError(
+        f"--types: {text!r}, expected TYPE=KIND,..., each type once, for example 1=grain,2=fine"
+    )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -173,19 +136,13 @@ def run(options: argparse.Namespace) -> int:
     """
     from fdnet.network.tessellation.delaunay import check_lengths
 
-    table = None if options.csv is None else table_file(options.csv, options.spheres)
     given = _read(options)
-    periodic = given.periodic
-    check_lengths(given.spheres, periodic)
+    check_lengths(given.spheres, given.periodic)
     axes = "xyz" if options.axis == ALL_AXES else options.axis
     by_axis = {axis: _along(axis, given, options) for axis in axes}
     results = by_axis[axes[0]]
     if options.axis == ALL_AXES:
         results = [row | _by_axis(by_axis, number) for number, row in enumerate(results)]
-    if table is not None:
-        from fdnet.report.tables import write_laws
-
-        write_laws(table, results)
     if options.json:
         from fdnet.report.tables import plain_json
 
@@ -195,9 +152,7 @@ def run(options: argparse.Namespace) -> int:
     from fdnet.report.text import permeability_lines
 
     fines = len(given.spheres.fines()) > 0
-    sides, sections = _sides(periodic, options), options.sections > 1
-    for line in permeability_lines(results, sides=sides, sections=sections, fines=fines):
-        print(line)
+    print(*permeability_lines(results, sections=options.sections > 1, fines=fines), sep="\n")
     return 0
 
 
@@ -209,43 +164,32 @@ def _read(options: argparse.Namespace) -> "SphereFile":
     from fdnet.network.specimen import wide_fines
     from fdnet.spheres.readers import read_sphere_file
 
-    given = read_sphere_file(
-        options.spheres,
-        units=options.units,
-        box=None if options.box is None else box_of(options.box),
-        fines_below=options.fines_below,
-        types=None if options.types is None else types_of(options.types),
-        periodic=None if options.periodic is None else directions_of(options.periodic),
-    )
+    names = ("units", "box", "fines_below", "types", "periodic")
+    given = read_sphere_file(options.spheres, **{name: getattr(options, name) for name in names})
     grains, fines = given.spheres.grains(), given.spheres.fines()
     if len(grains) < (1 if any(given.periodic) else 4):
-        why = (
-            "for a tetrahedron; a periodic cell of fewer needs --periodic"
-            if len(grains)
-            else "for a tetrahedron; the dump of an invasion holds fines alone (give the run's "
-            "spheres_damaged.csv instead)"
-        )
+        why = "a periodic cell of fewer needs --periodic"
+        if not len(grains):
+            why = "the dump of an invasion holds fines alone (give the run's spheres_damaged.csv)"
         raise CaseError(
-            f"{options.spheres}: {len(grains)} grains, expected at least 4 {why}; if grains and "
-            "fines were taken for each other, use --fines-below or --types"
+            f"{options.spheres}: {len(grains)} grains, expected at least 4 for a tetrahedron; "
+            f"{why}; if grains and fines were taken for each other, use --fines-below or --types"
         )
     why = wide_fines(grains, fines)
     unasked = any("type 2 a fine" in one for one in given.assumptions)
-    if unasked and not why and len(fines):
-        share = float(fines.radius.max() / grains.radius.min())
-        if share > _LARGE_FINE:
-            why = (
-                f"fines: the largest sphere of type 2 has {share:.2f} of the radius of the "
-                f"smallest of type 1, expected at most {_LARGE_FINE:g} where nothing says that "
-                "type 2 are fines"
-            )
-    if why:
-        kinds = (
-            "; --types 1=grain,2=grain takes both types as grains, --types 1=grain,2=fine says "
-            "that type 2 are fines"
-            if options.types is None and unasked
-            else "; name them grains, or tell them apart with --types or --fines-below"
+    share = float(fines.radius.max(initial=0.0) / grains.radius.min())
+    if unasked and not why and share > _LARGE_FINE:
+        why = (
+            f"fines: the largest sphere of type 2 has {share:.2f} of the radius of the smallest "
+            f"of type 1, expected at most {_LARGE_FINE:g} where nothing says that type 2 are fines"
         )
+    if why:
+        kinds = "; name them grains, or tell them apart with --types or --fines-below"
+        if options.types is None and unasked:
+            kinds = (
+                "; --types 1=grain,2=grain takes both types as grains, --types 1=grain,2=fine "
+                "says that type 2 are fines"
+            )
         raise CaseError(f"{options.spheres}: {why}{kinds}")
     if given.around_grains and any(given.periodic):
         raise CaseError(
@@ -255,104 +199,75 @@ def _read(options: argparse.Namespace) -> "SphereFile":
 
 
 def _along(axis: str, given: "SphereFile", options: argparse.Namespace) -> list[dict[str, Any]]:
-    """What each pair of laws gives for flow along `axis`, the chosen pair first."""
+    """What each pair of laws gives for flow along `axis`, the chosen pair first.
+
+    Where the chosen laws are off by factors, a warning has the numbers by the default ones.
+    """
+    from fdnet.network.permeability import compare
     from fdnet.network.specimen import pack_doubts
     from fdnet.report.text import thesis_law_warning
 
     spheres, along, periodic = given.spheres.turned(axis), "xyz".index(axis), given.periodic
-    around = (periodic[along], periodic[(along + 1) % 3], periodic[(along + 2) % 3])
     notes = list(given.warnings)
     if given.around_grains:
         walled = "".join(one for one, yes in zip("xyz", periodic, strict=True) if not yes)
         walls = ", with walls across the flow" if set(walled) - {axis} else ""
         notes.append(Doubt("no-box", f"no --box given: the box around all grains was used{walls}"))
     notes += pack_doubts(given.spheres, axis, options.walls)
-    facts = [*given.assumptions, *_assumptions(spheres, periodic, options)]
-    rows: list[dict[str, Any]] = []
-    first: Analysis | None = None
-    for result, seconds in _measure(spheres, around, options):
-        if first is not None and (result.law, result.damage_law) == (DEFAULT_LAW, AUTO):
+    default, chosen = (DEFAULT_LAW, AUTO), (options.law or DEFAULT_LAW, options.damage_law or AUTO)
+    pairs = [chosen, *(law_pairs() if options.compare_laws else ())]
+    if off_by_factors(*chosen, fines=len(spheres.fines()) > 0):
+        pairs.append(default)
+    results = compare(
+        spheres,
+        periodic=(periodic[along], periodic[(along + 1) % 3], periodic[(along + 2) % 3]),
+        laws=list(dict.fromkeys(pairs)),
+        sections=options.sections,
+        walls=options.walls,
+        profile_bin_mm=1e3 * (spheres.box[0, 1] - spheres.box[0, 0]) / PROFILE_BINS,
+    )
+    first = next(results)
+    facts = [*given.assumptions, *_assumptions(first, axis, periodic, options)]
+    more = {"warnings": [explained(one) for one in [*notes, *first.warnings]]}
+    rows = [_row(first) | more | {"assumptions": facts}]
+    for result in results:
+        if (result.law, result.damage_law) == default:
             rows[0]["warnings"].insert(0, explained(thesis_law_warning(first, result)))
-            break
-        first = first or result
-        used = result.damage_law_used
-        if not rows and max(result.copies) > 1:
-            times = " x ".join(str(result.copies[("xyz".index(k) - along) % 3]) for k in "xyz")
-            facts = [
-                *facts,
-                f"The cell was repeated {times} times, because it is too small for the "
-                "tessellation; its permeability is the same.",
-            ]
-        if options.damage_law is None and not rows and used is not None:
-            facts = [*facts, f"The damage law is fdnet's default, here {used}."]
-        said = [explained(one) for one in [*notes, *result.warnings]]
-        more = {"warnings": said, "assumptions": facts}
-        rows.append(_row(result, seconds) | more)
+        else:
+            said = [explained(one) for one in [*notes, *result.warnings]]
+            rows.append(_row(result) | {"warnings": said, "assumptions": facts})
     return rows
 
 
-def _measure(
-    spheres: "Snapshot", periodic: tuple[bool, bool, bool], given: argparse.Namespace
-) -> Iterator[tuple["Analysis", float]]:
-    """Each result with its seconds; those of the first hold what all of them share."""
-    from fdnet.network.permeability import compare
-
-    chosen = (given.law or DEFAULT_LAW, given.damage_law or AUTO)
-    others = law_pairs() if given.compare_laws else []
-    if off_by_factors(*chosen, fines=len(spheres.fines()) > 0):
-        others = [*others, (DEFAULT_LAW, AUTO)]
-    start = time.perf_counter()
-    for result in compare(
-        spheres,
-        periodic=periodic,
-        laws=[chosen, *(pair for pair in others if pair != chosen)],
-        sections=given.sections,
-        walls=given.walls,
-        profile_bin_mm=1e3 * (spheres.box[0, 1] - spheres.box[0, 0]) / PROFILE_BINS,
-    ):
-        now = time.perf_counter()
-        yield result, now - start
-        start = now
-
-
 def _assumptions(
-    spheres: "Snapshot", periodic: tuple[bool, bool, bool], given: argparse.Namespace
+    first: "Analysis", axis: str, periodic: tuple[bool, bool, bool], given: argparse.Namespace
 ) -> Iterator[str]:
     """What the answer rests on, one sentence each."""
     yield "The fluid creeps (Stokes flow): permeability depends on the geometry alone."
     if any(periodic):
         names = ", ".join(axis for axis, yes in zip("xyz", periodic, strict=True) if yes)
         yield f"The spheres repeat along {names}, with the sides of the box as periods."
-    walls = [
-        axis
-        for axis, repeats in zip("xyz", periodic, strict=True)
-        if not repeats and axis != given.axis
-    ]
-    if walls:
+    sides = [one for one, repeats in zip("xyz", periodic, strict=True) if not repeats]
+    if walls := ", ".join(one for one in sides if one != given.axis):
         what = "hold the fluid" if given.walls == "no-slip" else "let the fluid slip"
-        yield f"Sides across {', '.join(walls)} are walls that {what}."
+        yield f"Sides across {walls} are walls that {what}; the flow has an inlet and an outlet."
     if given.law is None:
         yield f"The conductance law is fdnet's default, {DEFAULT_LAW}."
-    if len(spheres.fines()):
+    if first.occupancy is not None:
         yield "Fines and grains stay where they are."
+    if max(first.copies) > 1:
+        times = " x ".join(
+            str(first.copies[("xyz".index(k) - "xyz".index(axis)) % 3]) for k in "xyz"
+        )
+        yield (
+            f"The cell was repeated {times} times, because it is too small for the "
+            "tessellation; its permeability is the same."
+        )
+    if given.damage_law is None and first.damage_law_used is not None:
+        yield f"The damage law is fdnet's default, here {first.damage_law_used}."
 
 
-def _sides(periodic: tuple[bool, bool, bool], options: argparse.Namespace) -> str:
-    """What each side of the box is, on one line."""
-    what = "hold the fluid" if options.walls == "no-slip" else "let the fluid slip"
-    if options.axis == ALL_AXES:
-        across = [f"{name} periodic" for name, yes in zip("xyz", periodic, strict=True) if yes]
-        walls = [] if all(periodic) else [f"the other sides: walls that {what}"]
-        return "; ".join(["along each axis: inlet and outlet", *across, *walls])
-    others = [(k, name) for k, name in enumerate("xyz") if name != options.axis]
-    walled = ", ".join(name for k, name in others if not periodic[k])
-    repeated = ", ".join(name for k, name in others if periodic[k])
-    parts = [f"{options.axis}: inlet and outlet"]
-    parts += [f"{walled}: walls that {what}"] if walled else []
-    return "; ".join([*parts, f"{repeated}: periodic"] if repeated else parts)
-
-
-def _row(result: "Analysis", seconds: float) -> dict[str, Any]:
+def _row(result: "Analysis") -> dict[str, Any]:
     from fdnet.report.tables import section_rows
 
     return {
@@ -372,7 +287,7 @@ def _row(result: "Analysis", seconds: float) -> dict[str, Any]:
         "sections": section_rows(result),
         "network_counts": result.counts,
         "spheres_dropped": result.counts["spheres_dropped"],
-        "seconds": seconds,
+        "seconds": sum(result.seconds.values()),
     }
 
 

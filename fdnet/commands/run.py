@@ -8,14 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.commands.options import (
-    LIGGGHTS,
-    OUTPUT,
-    THE_CASE,
-    case_of,
-    new_command,
-    stages_of,
-)
+from fdnet.commands.options import LIGGGHTS, OUTPUT, THE_CASE, case_of, new_command, stages_of
 from fdnet.errors import PAGE, CaseError
 from fdnet.files import path_option
 
@@ -23,19 +16,15 @@ if TYPE_CHECKING:
     from fdnet.scales.check import Checked
 
 
+LOOK_AT_FIRST = ("u", "Re", "d/D", "n", "t_run")
+"""Symbols in the table of scales: velocity, throat ratio, number of fines, time."""
+
+
 def add_case_commands(commands: Any) -> None:
     """Adds `fdnet run`, `check` and `render` to the command line."""
     about = "pack the sand, let fines invade it, give the permeability before and after"
     example = "fdnet run mine.toml --out runs/mine --set fines.count=500"
-    run = new_command(
-        commands,
-        "run",
-        _run,
-        about,
-        example,
-        f"{example} --resume",
-        "fdnet render mine.toml --out decks    # --dry-run that writes the LIGGGHTS decks too",
-    )
+    run = new_command(commands, "run", _run, about, example, f"{example} --resume")
     run.share("case", "--seed", "--set", "--np", "--liggghts", "--launcher", "--timeout")
     pack = "take the finished pack of this run folder, made of the same grains and seed"
     run.add(LIGGGHTS, "--pack-from RUN", pack, path_option)
@@ -44,7 +33,8 @@ def add_case_commands(commands: Any) -> None:
     run.share("--force", "--stages", "--json", "--quiet")
     fast = "the fast model: size classes on the pore network instead of spheres in LIGGGHTS"
     run.add(THE_CASE, "--fast", fast)
-    dry = "run and write nothing; print velocities, time steps and what is odd"
+    dry = "run and write nothing; print velocities, time steps and what is odd (fdnet render CASE "
+    dry += "--out DIR writes the LIGGGHTS decks too)"
     run.add(OUTPUT, "--dry-run", dry)
 
     about = "say what is odd about a case, what to do about it, and what the run takes"
@@ -112,12 +102,13 @@ def _print_scales(case: Any) -> "Checked":
     from fdnet.scales.table import scale_rows
 
     for row in scale_rows(case, scales_of(case)):
+        mark = ">" if row.symbol in LOOK_AT_FIRST else " "
         print(
-            f"{row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} "
+            f"{mark} {row.name:<36} {row.symbol:<11} {row.value:>12.4g} {row.unit:<5} "
             f"{row.formula:<40} {row.source}"
         )
     result = looked_at(case)
-    print("\n".join(result.lines()))
+    print("> marks what to look at first", *result.lines(), sep="\n")
     return result
 
 

@@ -655,23 +655,16 @@ def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
     below.set(xlabel="distance from the face (mm)", xlim=(0, MM * edges[-1]))
 
 
-def fill_filtrate(
-    figure: Any, *, time: Array, volume: Array, fitted: Array | None, said: str
-) -> None:
-    """Filtrate per area, m, against the root of time, s, and the fit at the same times."""
+def fill_filtrate(figure: Any, *, time: Array, volume: Array) -> None:
+    """Filtrate per area, m, against the root of time, s."""
     axes = figure.add_subplot()
-    root = np.sqrt(time)
-    axes.plot(root, MM * volume, color=BLUE, label="simulated")
-    if fitted is not None:
-        axes.plot(root, MM * fitted, "--", color=ORANGE, label="t = a V² + b V + c")
+    axes.plot(np.sqrt(time), MM * volume, color=BLUE)
     axes.set(
         xlabel="root of the time of the fluid (s$^{1/2}$)",
         ylabel="filtrate per area (mm)",
         xlim=(0, None),
         ylim=(0, None),
     )
-    axes.set_title(said, fontsize=10)
-    axes.legend(loc="lower right")
 
 
 def fill_bridging(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:

@@ -257,8 +257,8 @@ GLASS = 0.10
 """Opacity of a grain where the flow is shown."""
 NOTHING = 1e-30
 """Drawn for a flux of 0, which has no logarithm."""
-WIDEST, LINE = 0.12, 0.030
-"""Radius of the pipe of the largest flux, and of a streamline, in radii of a grain."""
+WIDEST = 0.12
+"""Radius of the pipe of the largest flux, in radii of a grain."""
 THINNEST_PIPE = 0.12
 """Radius of the pipe of a flux below the colours, over that of the largest."""
 FLOW_COLOURS = ["#E4F4CB", "#C7E9B4", "#7FCDBB", "#41B6C4", "#1D91C0", "#225EA8", "#253494"]
@@ -296,7 +296,7 @@ def draw_pictures(work: dict[str, Any]) -> None:
             plotter.add_mesh(_balls(still, grains, 24), **glass)
             _add_fines(plotter, state, bounds, color=FINE_COLOUR, ambient=0.25)
             radius = float(still.point_data["radius_m"].mean()) * MM
-            _add_lines(plotter, pv.read(lines), bounds, radius, work["title"], work["limits"])
+            _add_lines(plotter, pv.read(lines), radius, work["title"], work["limits"])
         else:
             own = state.n_points and np.any(state.point_data["kind"] == Kind.GRAIN)
             packed = state if own else still
@@ -375,18 +375,14 @@ def _add_fines(plotter: Any, spheres: Any, bounds: Array, **style: Any) -> None:
 
 
 def _add_lines(
-    plotter: Any, mesh: Any, bounds: Array, radius: float, title: str, limits: Sequence[float]
+    plotter: Any, mesh: Any, radius: float, title: str, limits: Sequence[float]
 ) -> None:
-    """Pipes among grains of a mean `radius`: throats as wide as their flux, streamlines alike."""
+    """Throats as pipes among grains of a mean `radius`, as wide as their flux."""
     mesh.points = mesh.points * MM
-    throats = "value" in mesh.cell_data
-    if mesh.n_points and not throats:  # not as far upstream as fines are not shown either
-        start = bounds[0, 0] - UPSTREAM_SHOWN * np.ptp(bounds[0])
-        mesh = mesh.clip(normal="x", origin=(start, 0.0, 0.0), invert=False)
     if not mesh.n_points:
         return
     plotter.add_mesh(
-        _pipes(mesh, radius, limits[1]) if throats else mesh.tube(radius=LINE * radius, n_sides=6),
+        _pipes(mesh, radius, limits[1]),
         scalars="value",
         log_scale=True,
         clim=limits,

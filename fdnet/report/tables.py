@@ -110,18 +110,6 @@ def write_sections(path: str | Path, analysis: "Analysis") -> Path:
     )
 
 
-def write_laws(path: str | Path, rows: Sequence[Mapping[str, Any]]) -> Path:
-    """One row for each pair of laws: their names, permeabilities (m2) and porosities.
-
-    Where the three directions were asked for, also `k_x_m2`, `k_x_damaged_m2` and so on.
-    """
-    names = ["law", "damage_law", "k_initial_m2", "k_damaged_m2", "k_reduction"]
-    names += ["porosity_initial", "porosity_damaged"]
-    names += [f"k_{axis}{state}_m2" for state in ("", "_damaged") for axis in "xyz"]
-    kept = [name for name in names if name in rows[0]]
-    return write_rows(path, {name: [row[name] for row in rows] for name in kept})
-
-
 def write_profile(path: str | Path, analysis: "Analysis") -> Path:
     """One row for each bin of depth.
 

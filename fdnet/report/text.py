@@ -397,7 +397,8 @@ def seconds_line(summary: Mapping[str, Any]) -> str:
     """What the run took."""
     seconds = summary["seconds"]
     outside = sum(seconds.get(stage, 0.0) for stage in STAGES) - seconds["liggghts"]
-    return f"seconds       {seconds['liggghts']:.1f} in LIGGGHTS, {outside:.1f} outside"
+    cut = ", without the invasion so far" if summary["stop_reason"] == "unfinished" else ""
+    return f"seconds       {seconds['liggghts']:.1f} in LIGGGHTS, {outside:.1f} outside{cut}"
 
 
 def text_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
@@ -446,13 +447,12 @@ def _states(analysis: "Analysis") -> str:
 
 
 def permeability_lines(
-    results: Sequence[Mapping[str, Any]], *, sides: str, sections: bool, fines: bool
+    results: Sequence[Mapping[str, Any]], *, sections: bool, fines: bool
 ) -> Iterator[str]:
     """The laws as a table, then the sections where there are any, and warnings.
 
     Args:
         results: one row for each pair of laws, the chosen pair first.
-        sides: what each side of the box is.
         sections: whether sections are printed.
         fines: whether there are fines; without them nothing is damaged.
     """
@@ -460,7 +460,7 @@ def permeability_lines(
     porosity = f"porosity {first['porosity_initial']:.5f}"
     if fines:
         porosity += f" -> {first['porosity_damaged']:.5f}"
-    yield f"{porosity}, {first['pores']} pores, {first['throats']} throats; {sides}"
+    yield f"{porosity}, {first['pores']} pores, {first['throats']} throats"
     axes = "xyz" if "k_x_m2" in first else ""
     pairs = fines or len({row["damage_law"] for row in results}) > 1
     names = f"{'k m2':>12} {'k mD':>12}"

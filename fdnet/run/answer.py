@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from fdnet.case.case import Case, InvasionCase
 from fdnet.names import ALL_SPHERES, SIZE_CLASSES
 from fdnet.report.text import answer_sentence, cake_words, certainty, end_words, in_place_words
-from fdnet.run.bridging import OpenThroats, open_throats, width_rows
+from fdnet.run.bridging import OpenThroats, open_throats
 from fdnet.spheres.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -18,19 +17,12 @@ if TYPE_CHECKING:
 
 
 class Step(NamedTuple):
-    """A layer of one permeability behind the formation face.
+    """A layer of one permeability behind the formation face."""
 
-    Attributes:
-        near: m, depth where it begins.
-        far: m, depth where it ends.
-        before: m2, permeability without fines.
-        after: m2, with fines.
-    """
-
-    near: float
-    far: float
-    before: float
-    after: float
+    near: float  # m, depth where it begins
+    far: float  # m, depth where it ends
+    before: float  # m2, permeability without fines
+    after: float  # m2, with fines
 
 
 # ------------------------------------------------------------------------------------------------
@@ -46,22 +38,16 @@ _TOUCH = 1e-9
 
 
 class Zone(NamedTuple):
-    """The damaged zone.
+    """The damaged zone."""
 
-    Attributes:
-        depth: m, where its deepest damaged layer ends; 0 without damage.
-        ratio: permeability of the zone with the fines over that without, layers in series; 1
-            without damage.
-        before: m2, permeability of the zone without the fines; None without damage.
-        after: m2, with the fines; None without damage.
-        open_end: whether the last layer of the specimen is damaged too, so that the damage may
-            reach further than the specimen.
-    """
-
-    depth: float = 0.0
+    depth: float = 0.0  # m, where its deepest damaged layer ends; 0 without damage
+    # permeability of the zone with the fines over that without, layers in series; 1 without damage
     ratio: float = 1.0
+    # m2, permeability of the zone without the fines; None without damage
     before: float | None = None
-    after: float | None = None
+    after: float | None = None  # m2, with the fines; None without damage
+    # whether the last layer of the specimen is damaged too, so that the damage may reach further
+    # than the specimen
     open_end: bool = False
 
 
@@ -213,24 +199,6 @@ LARGEST = 0.99
 """Share of the open throats between grains, by number, that are narrower than the "largest"."""
 
 
-class BridgingSizes(NamedTuple):
-    """Diameters in m; shares are by volume.
-
-    Attributes:
-        fines: D50, D85 and D90 of the fines by name.
-        throat_median: median of the open throats, by number.
-        throat_largest: throat that 99 % of the open ones are narrower than.
-        grain_d15: D15 of the grains.
-        concentration: share of solids in the mud.
-    """
-
-    fines: Mapping[str, float]
-    throat_median: float
-    throat_largest: float
-    grain_d15: float
-    concentration: float
-
-
 def run_shows(summary: Mapping[str, Any]) -> str:
     """What the sand did with the fines: "bridges", "passes" or "undecided".
 
@@ -246,26 +214,41 @@ def run_shows(summary: Mapping[str, Any]) -> str:
     return "bridges" if summary["stop_reason"] == "plugged" else "undecided"
 
 
-def rules_of(sizes: BridgingSizes, shows: str) -> list[dict[str, Any]]:
-    """What every rule says, and whether it agrees with what the run shows (`run_shows`).
+def rules_of(
+    shows: str,
+    *,
+    fines: Mapping[str, float],
+    throat_median: float,
+    throat_largest: float,
+    grain_d15: float,
+    concentration: float,
+) -> list[dict[str, Any]]:
+    """What every rule says, and whether it agrees with what the run `shows` (`run_shows`).
 
     `value` is of the case and dimensionless, `limit` of the rule; a rule `says` "bridges",
     "passes" or "between", and `agrees` is None where rule or run is undecided.
+
+    Args:
+        shows: what `run_shows` gives.
+        fines: D50, D85 and D90 of the fines by name, m, by volume.
+        throat_median: median diameter of the open throats, m, by number.
+        throat_largest: diameter that 99 % of the open ones are narrower than, m.
+        grain_d15: D15 of the grains, m.
+        concentration: share of solids in the mud, by volume.
     """
-    fines = sizes.fines
-    ratio = fines["D50"] / sizes.throat_median
-    abrams = ratio >= ABRAMS_SIZE and sizes.concentration >= ABRAMS_SHARE
-    largest = fines["D90"] / sizes.throat_largest
-    line = fines["D50"] / (SQRT_SHARE * sizes.throat_largest)
+    ratio = fines["D50"] / throat_median
+    abrams = ratio >= ABRAMS_SIZE and concentration >= ABRAMS_SHARE
+    largest = fines["D90"] / throat_largest
+    line = fines["D50"] / (SQRT_SHARE * throat_largest)
     on_line = line >= 1 / SQRT_REACH and largest >= 1
-    kept = sizes.grain_d15 / fines["D85"]
+    kept = grain_d15 / fines["D85"]
     filtered = "bridges" if kept <= FILTER_SAFE else "passes" if kept > FILTER_FAILS else "between"
     names = ("rule", "source", "quantity", "value", "limit", "says")
     rows = (
         (
             "median size and concentration",
             "Abrams 1977, J. Pet. Technol. 29(5), 586-592",
-            f"D50 of the fines over the median throat, at {100 * sizes.concentration:.3g} % of "
+            f"D50 of the fines over the median throat, at {100 * concentration:.3g} % of "
             "solids by volume",
             ratio,
             "bridges from 1/3 on, at 5 % of solids or more",
@@ -311,45 +294,26 @@ def rules_of(sizes: BridgingSizes, shows: str) -> list[dict[str, Any]]:
 SOURCE = "docs/thesis/results.csv"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scatter:
-    """One standard deviation of a single run, pooled over cases.
+class Scatter(NamedTuple):
+    """One standard deviation of a single run, pooled over `cases` whose seeds were repeated."""
 
-    Attributes:
-        depth: of the depth of 95 % of the fines, over its mean.
-        loss: of the share of permeability that the sand loses at the face; a difference.
-        runs: number of runs.
-        cases: the cases whose seeds were repeated.
-        source: where their results are, in words.
-    """
-
-    depth: float
-    loss: float
-    runs: int
-    cases: tuple[str, ...]
-    source: str
+    depth: float  # of the depth of 95 % of the fines, over its mean
+    loss: float  # of the share of permeability that the sand loses at the face; a difference
+    runs: int  # number of runs
+    cases: tuple[str, ...]  # what was repeated
+    source: str  # where the results are, in words
 
 
 QUICK = Scatter(
-    depth=0.36,
-    loss=0.067,
-    runs=30,
+    *(0.36, 0.067, 30),
     cases=tuple(f"quick-specimen{number}" for number in (1, 2, 4, 5, 7, 8)),
     source=f"quick specimens 1, 2, 4, 5, 7 and 8 of {SOURCE}",
 )
 """Specimens of 110 grains, 3 grains wide."""
-FOLLOWED = Scatter(
-    depth=0.263,
-    loss=0.0144,
-    runs=8,
-    cases=("quick",),
-    source="cases/quick.toml",
-)
+FOLLOWED = Scatter(0.263, 0.0144, 8, cases=("quick",), source="cases/quick.toml")
 """A specimen of 240 grains in a flow that follows the deposit (docs/validation/seeds.csv)."""
 FULL = Scatter(
-    depth=0.42,
-    loss=0.019,
-    runs=12,
+    *(0.42, 0.019, 12),
     cases=tuple(f"specimen{number}" for number in (1, 2, 4, 5)),
     source=f"specimens 1, 2, 4 and 5 of {SOURCE}",
 )
@@ -368,12 +332,12 @@ def with_answer(
     """`summary` with the keys of the answer; `spheres` are those at the end.
 
     Adds `answer` and `certainty` (sentences) always; with fines also `words` (parts of
-    sentences), `damage`, `throats_bridged`, `rules`, `scatter`, and `skin` and `skin_flow_lost`
-    where the case has a well. Infinite skins are null.
+    sentences), `damage`, `rules`, `scatter`, and `skin` and `skin_flow_lost` where the case has a
+    well. Infinite skins are null.
     """
     result = dict(summary)
     if isinstance(case, InvasionCase) and analysis.occupancy is not None:
-        steps, throats = steps_of(analysis), open_throats(analysis)
+        steps = steps_of(analysis)
         zone = zone_of(steps)
         result["damage"] = {
             "zone_depth_m": zone.depth,
@@ -399,9 +363,10 @@ def with_answer(
             "runs": scatter.runs,
             "source": scatter.source,
         }
-        result["throats_bridged"] = width_rows(throats)
         result["run_shows"] = run_shows(summary)
-        result["rules"] = rules_of(_bridging_sizes(case, throats), result["run_shows"])
+        result["rules"] = rules_of(
+            result["run_shows"], **_bridging_sizes(case, open_throats(analysis))
+        )
         result["words"] = {
             "end": end_words(summary, case.run),
             "cake": cake_words(summary),
@@ -410,15 +375,15 @@ def with_answer(
     return {**result, "answer": answer_sentence(result), "certainty": list(certainty(result))}
 
 
-def _bridging_sizes(case: InvasionCase, throats: OpenThroats) -> BridgingSizes:
-    """Of throats between grains; where all are at walls or end faces, of those."""
+def _bridging_sizes(case: InvasionCase, throats: OpenThroats) -> dict[str, Any]:
+    """What `rules_of` compares, of throats between grains; where there are none, of all."""
     width = throats.width[throats.between | ~throats.between.any()]
     middle, largest = np.quantile(width, (0.5, LARGEST))
     fines = case.fines.curve
-    return BridgingSizes(
-        fines={f"D{share}": fines.size_at(share / 100) for share in (50, 85, 90)},
-        throat_median=float(middle),
-        throat_largest=float(largest),
-        grain_d15=case.grains.curve.size_at(0.15),
-        concentration=case.fines.volume_fraction,
-    )
+    return {
+        "fines": {f"D{share}": fines.size_at(share / 100) for share in (50, 85, 90)},
+        "throat_median": float(middle),
+        "throat_largest": float(largest),
+        "grain_d15": case.grains.curve.size_at(0.15),
+        "concentration": case.fines.volume_fraction,
+    }

@@ -1,14 +1,12 @@
-"""Which throats the fines close, by the width of the throat and by the ratio of fine to throat.
+"""Which throats the fines close, by the ratio of fine to throat.
 
 A throat is the circle that touches three grains. At a side wall or an end face it runs out to
-the mirror images of the grains, which make it wider than any between grains, and each such throat
-counts twice; these have a row of their own, and no width. Shares of a count have Wilson's 95 %
-band (J. Am. Stat. Assoc. 22, 209, 1927).
+the mirror images of the grains, which make it wider than any between grains; these do not count.
+Shares of a count have Wilson's 95 % band (J. Am. Stat. Assoc. 22, 209, 1927).
 """
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,41 +19,25 @@ if TYPE_CHECKING:
 
 RATIOS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, math.inf)
 """Edges of the classes of the diameter of a fine over that of the throat."""
-CLASSES = 4
-"""Classes of throats by their width, of equal number."""
-BRIDGED, CLOGGED = 0.5, 0.1
-"""Share of the clean conductance up to which a throat is bridged, below which it is clogged."""
+CLOGGED = 0.1
+"""Share of the clean conductance below which a throat is clogged."""
 COUNTS = ("throats", "with_fines", "blocked", "clogged", "closed")
 """The counts of a row of bridging.csv."""
 
 
 class OpenThroats(NamedTuple):
-    """T open throats and what the fines do to them.
+    """T open throats and what the fines do to them."""
 
-    Attributes:
-        width: (T,) m, diameter.
-        fine: (T,) m, mean diameter of the fines in it; 0 where it holds none.
-        held: (T,) whether it holds a fine.
-        blocked: (T,) whether one fine covers its whole cross-section.
-        left: (T,) conductance over the clean one; 1 where that is 0.
-        between: (T,) whether it lies between three grains, and not at a wall or an end face.
-    """
-
-    width: Array
-    fine: Array
-    held: Array
-    blocked: Array
-    left: Array
-    between: Array
+    width: Array  # (T,) m, diameter
+    fine: Array  # (T,) m, mean diameter of the fines in it; 0 where it holds none
+    held: Array  # (T,) whether it holds a fine
+    blocked: Array  # (T,) whether one fine covers its whole cross-section
+    left: Array  # (T,) conductance over the clean one; 1 where that is 0
+    between: Array  # (T,) whether it lies between three grains, and not at a wall or an end face
 
     def where(self, use: Array) -> "OpenThroats":
         """The throats of a mask (T,)."""
         return OpenThroats(*(values[use] for values in self))
-
-    @property
-    def bridged(self) -> Array:
-        """(T,) whether it lost half of its conductance or more."""
-        return self.left <= BRIDGED
 
     @property
     def clogged(self) -> Array:
@@ -80,48 +62,6 @@ def open_throats(analysis: "Analysis") -> OpenThroats:
     return every.where(np.asarray(network.throat_radius) > 0)
 
 
-def width_rows(throats: OpenThroats) -> list[dict[str, Any]]:
-    """Classes of throats by width from the narrowest, and those at walls and end faces.
-
-    The columns add up to all open throats, and `blocked` to `throats_blocked` of the summary.
-    Diameters are in m; those of the fines are means over the fines in each bridged throat, and
-    null where no throat of the class is bridged.
-    """
-    inner, at_walls = throats.where(throats.between), throats.where(~throats.between)
-    classes: list[tuple[OpenThroats, float | None, float | None]] = []
-    if len(inner.width):
-        edges = np.quantile(inner.width, np.linspace(0, 1, CLASSES + 1))
-        number = np.clip(np.searchsorted(edges, inner.width, side="right") - 1, 0, CLASSES - 1)
-        for index, (low, high) in enumerate(pairwise(edges)):
-            classes.append((inner.where(number == index), float(low), float(high)))
-    if len(at_walls.width):
-        classes.append((at_walls, None, None))
-    rows = []
-    for own, lower, upper in classes:
-        inside = own.where(own.bridged & own.held)
-        sizes = [None] * 3
-        if len(inside.fine):
-            sizes = np.quantile(inside.fine, (0.0, 0.5, 1.0)).tolist()
-        over = None
-        if len(inside.fine) and lower is not None:
-            over = float(np.median(inside.fine / inside.width))
-        rows.append(
-            {
-                "throat_from_m": lower,
-                "throat_to_m": upper,
-                "throats": len(own.width),
-                "with_fines": int(own.held.sum()),
-                "bridged": int(own.bridged.sum()),
-                "blocked": int(own.blocked.sum()),
-                "fines_smallest_m": sizes[0],
-                "fines_median_m": sizes[1],
-                "fines_largest_m": sizes[2],
-                "fine_over_throat": over,
-            }
-        )
-    return rows
-
-
 def ratio_rows(
     analysis: "Analysis", *, entered: int, fine_diameter: float, concentration: float
 ) -> list[dict[str, Any]]:
@@ -143,21 +83,12 @@ def ratio_rows(
     use = (reached & (analysis.conductance_initial > 0))[is_open] & throats.between
     throats, flux = throats.where(use), np.abs(flow.throat_flux[is_open][use])
     arrived = entered * flux / flow.inflow if flow.inflow > 0 else np.zeros(len(flux))
-    over = np.where(throats.held, throats.fine, fine_diameter) / throats.width
-    return classes_of(over, throats, arrived, concentration)
-
-
-def classes_of(
-    ratio: Array, throats: OpenThroats, arrived: Array, concentration: float
-) -> list[dict[str, Any]]:
-    """`throats` by classes of their `ratio` (T,); `arrived` (T,) fines would come to each."""
-    which = np.searchsorted(RATIOS, ratio, "right") - 1
-    rows = []
+    ratio = np.where(throats.held, throats.fine, fine_diameter) / throats.width
+    which, rows = np.searchsorted(RATIOS, ratio, "right") - 1, []
     for number in np.unique(which):
-        own = throats.where(which == number)
-        some = (own.width > 0, own.held, own.blocked, own.clogged, own.blocked | own.clogged)
-        counts = [int(one.sum()) for one in some]
-        came = float(arrived[which == number].sum())
+        own, came = throats.where(which == number), float(arrived[which == number].sum())
+        some = (own.held, own.blocked, own.clogged, own.blocked | own.clogged)
+        counts = [len(own.width), *(int(one.sum()) for one in some)]
         rows.append(class_row(concentration, RATIOS[number], RATIOS[number + 1], counts, came))
     return rows
 

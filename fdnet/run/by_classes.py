@@ -80,10 +80,16 @@ class ClassModel:
         return Counts(per_row=per_row, invaded=invaded, passed=passed, upstream=upstream)
 
 
-def class_model(case: InvasionCase, scales: InvasionScales, grains: Snapshot) -> ClassModel:
-    """The model of a case. Raises NetworkError or FlowError where the pack has no flow."""
+def class_model(
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, network: Network | None = None
+) -> ClassModel:
+    """The model of a case. Raises NetworkError or FlowError where the pack has no flow.
+
+    The `network` of the grains is built where it is not given.
+    """
     choices = InvasionChoices() if case.invasion is None else case.invasion
-    network = build_network(grains, periodic=case.periodic, walls=case.analysis.walls)
+    if network is None:
+        network = build_network(grains, periodic=case.periodic, walls=case.analysis.walls)
     halves = grain_resistances(network)
     clean = 1.0 / halves.sum(axis=1)
     first = solve_flow(network, clean)

@@ -12,7 +12,7 @@ from fdnet.dem.invade_deck import DrivingFluid
 from fdnet.errors import explained
 from fdnet.run.dem_stages import invaded, invasion_record, is_done, packed_grains
 from fdnet.run.fluid import Mirrored, fluid_of, mirrored
-from fdnet.run.folder import RECORD_FORMAT, START_OVER, check_files, digests_of
+from fdnet.run.folder import START_OVER, check_files, digests_of
 from fdnet.run.progress import Progress
 from fdnet.run.records import Session, run_record
 from fdnet.scales.scales import BackFlow, back_flow
@@ -28,7 +28,11 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     """Turn the flow back, unless that is done. Raises what `clean_up` raises."""
     if is_done(session, STAGE):
         return
-    grains, flow, folder = packed_grains(session), back_flow(case), session.path / STAGE
+    grains, flow, folder = (
+        packed_grains(session.path, session.case),
+        back_flow(case),
+        session.path / STAGE,
+    )
     start = Start(
         grains=grains,
         invaded=invaded(session, case, grains, invasion_record(session, case)).damaged,
@@ -44,10 +48,6 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     dumps = (f"post/clean_{row.step}.dump" for row in result.history)
     steps = last.chunk * flow.scales.checkpoint_steps
     record = {
-        "format": RECORD_FORMAT,
-        "digest": start.digest,
-        "seconds": session.seconds[STAGE],
-        "cpu_seconds": session.cpu_seconds[STAGE],
         "stop_reason": result.stop_reason,
         "out": last.out,
         "max_overlap": overlap_in(case, result.state).fraction,
@@ -60,7 +60,7 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
         "runs": [run_record(run) for run in result.runs],
         "left_out": [str(item) for item in result.left_out],
     }
-    session.folder.finish(STAGE, record)
+    session.finish(STAGE, record)
 
 
 def fluid_turned_back(flow: BackFlow, grains: Snapshot) -> DrivingFluid | None:
@@ -71,19 +71,12 @@ def fluid_turned_back(flow: BackFlow, grains: Snapshot) -> DrivingFluid | None:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Returned:
-    """What a clean-up gave.
+    """What a clean-up gave."""
 
-    Attributes:
-        state: grains and remaining fines at the end.
-        analysis: of this state, with the damage law that the invasion was measured by.
-        before: (N,) depth of the fines inside before, m.
-        stayed: (N,) whether each of them is still inside.
-    """
-
-    state: Snapshot
-    analysis: "Analysis"
-    before: Array
-    stayed: Array
+    state: Snapshot  # grains and remaining fines at the end
+    analysis: "Analysis"  # of this state, with the damage law that the invasion was measured by
+    before: Array  # (N,) depth of the fines inside before, m
+    stayed: Array  # (N,) whether each of them is still inside
 
 
 def returned(session: Session, case: InvasionCase, grains: Snapshot) -> Snapshot:

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-from fdnet.case.case import InvasionCase
+from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.checkpoint import read_history, read_updates, state_at
 from fdnet.dem.deck import snapshot_of
 from fdnet.dem.invasion import invade, invasion_so_far
@@ -13,7 +14,7 @@ from fdnet.errors import CaseError, Doubt
 from fdnet.names import LIGGGHTS_STAGES
 from fdnet.run.by_classes import class_model, write_class_invasion
 from fdnet.run.fluid import fluid_of
-from fdnet.run.folder import START_OVER, check_files, may_be_gone
+from fdnet.run.folder import START_OVER, check_files, may_be_gone, read_record
 from fdnet.run.progress import Forecast, Progress
 from fdnet.run.records import (
     PACK_DUMP,
@@ -42,32 +43,29 @@ def pack_stage(session: Session) -> None:
     progress = Progress("pack", Forecast(expected=expected), show=session.options.show_progress)
     with session.timed("pack"), progress:
         pack = make_pack(case, folder, session.launch(progress))
-    seconds, assumed = session.seconds["pack"], session.scales.porosity
-    record = pack_record(case, pack, folder, assumed=assumed, seconds=seconds)
-    session.folder.finish("pack", record | {"cpu_seconds": session.cpu_seconds["pack"]})
+    session.finish("pack", pack_record(pack, folder, assumed=session.scales.porosity))
 
 
 def invade_stage(session: Session, case: InvasionCase) -> None:
     """Drive the fines in, unless that is done. Raises what `invade` raises."""
     if is_done(session, "invade"):
         return
-    scales, grains, folder = invasion_scales(case), packed_grains(session), session.path / "invade"
+    scales, grains, folder = (
+        invasion_scales(case),
+        packed_grains(session.path, session.case),
+        session.path / "invade",
+    )
     if case.by_classes:
         with session.timed("invade"):
             model = class_model(case, scales, grains)
             record = write_class_invasion(case, model, folder)
-        spent = {
-            "seconds": session.seconds["invade"],
-            "cpu_seconds": session.cpu_seconds["invade"],
-        }
-        session.folder.finish("invade", record | spent)
+        session.finish("invade", record)
         return
     progress = Progress("invade", _forecast(case, scales), show=session.options.show_progress)
     with session.timed("invade"), progress:
         launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
         result = invade(case, scales, grains, folder, launch, fluid=fluid)
-    record = invade_record(case, result, folder, seconds=session.seconds["invade"])
-    session.folder.finish("invade", record | {"cpu_seconds": session.cpu_seconds["invade"]})
+    session.finish("invade", invade_record(case, result, folder))
 
 
 def _forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
@@ -92,7 +90,7 @@ def invasion_record(session: Session, case: InvasionCase) -> dict[str, Any]:
     if record is not None:
         return record
     scales, folder = invasion_scales(case), session.path / "invade"
-    result = invasion_so_far(case, scales, packed_grains(session), folder)
+    result = invasion_so_far(case, scales, packed_grains(session.path, case), folder)
     if result is None:
         raise CaseError(f"{folder}: has no whole checkpoint yet; go on with --resume")
     # chunks take one time; where springs grow, in more steps
@@ -100,7 +98,7 @@ def invasion_record(session: Session, case: InvasionCase) -> dict[str, Any]:
         (row.chunk * scales.checkpoint_steps, row.invaded + row.passed) for row in result.history
     ]
     share = seen[-1][0] / _forecast(case, scales).end(seen)
-    return invade_record(case, result, folder, seconds=0.0) | {"share_done": share}
+    return invade_record(case, result, folder) | {"share_done": share}
 
 
 def is_done(session: Session, stage: str) -> bool:
@@ -117,22 +115,23 @@ def is_done(session: Session, stage: str) -> bool:
             "replace it"
         )
     if stage == "pack":
-        packed_grains(session)
+        packed_grains(session.path, session.case)
     else:
         check_files(session.path / stage, record, START_OVER, may_lack=may_be_gone)
     return True
 
 
-def packed_grains(session: Session) -> Snapshot:
-    """The grains of the finished pack.
+def packed_grains(folder: Path, case: Case) -> Snapshot:
+    """The grains of the finished pack in the run `folder`.
 
     Raises DumpError when the dump cannot be read or holds other radii than the case asks for,
     CaseError when it is not what the stage made.
     """
-    frame = read_frame(session.path / "pack" / PACK_DUMP)
-    check_files(session.path / "pack", session.folder.record("pack") or {}, START_OVER)
-    grains = snapshot_of(frame, session.case, time_s=0.0)
-    check_radii(grains, session.case, session.path / "pack" / PACK_DUMP)
+    dump = folder / "pack" / PACK_DUMP
+    frame = read_frame(dump)
+    check_files(folder / "pack", read_record(folder, "pack") or {}, START_OVER)
+    grains = snapshot_of(frame, case, time_s=0.0)
+    check_radii(grains, case, dump)
     return grains
 
 

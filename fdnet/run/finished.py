@@ -27,10 +27,9 @@ from fdnet.report.tables import (
     to_openpnm,
 )
 from fdnet.report.text import text_lines
-from fdnet.report.vtk import read_balls, read_mesh
 from fdnet.run.folder import ANALYSE_AGAIN, START_OVER, check_one, finished_manifest
 from fdnet.spheres.readers import read_spheres
-from fdnet.spheres.snapshot import Array, Snapshot
+from fdnet.spheres.snapshot import Snapshot
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -155,7 +154,8 @@ class FinishedRun:
         spheres_initial.csv; the box is that of the case, m. Fines upstream of the formation face
         (x < 0) are among the damaged ones.
         """
-        _check_state(state)
+        if state not in ("initial", "damaged"):
+            raise CaseError(f"state: {state!r}, expected 'initial' (no fines) or 'damaged'")
         box = [(0.0, side) for side in self.case.size_m]
         return self._read(f"spheres_{state}.csv", lambda path: read_spheres(path, box=box))
 
@@ -169,60 +169,26 @@ class FinishedRun:
             self.spheres().grains(), periodic=self.case.periodic, walls=self.case.analysis.walls
         )
 
-    def conductance(self, state: State = "damaged") -> Array:
-        """(T,) conductance of each throat, m3 (flux times viscosity over pressure drop).
-
-        With fines it is by the law `damage_law_other` of the summary, whose permeability is
-        `k_damaged_other_m2`; where there is none, by `damage_law_used`.
-        """
-        _check_state(state)
-        return self.throats[f"conductance_{state}_m3"].to_numpy()
-
-    def to_openpnm(self, state: State = "damaged", *, damage_law: str | None = None) -> Any:
+    def to_openpnm(self, state: State = "damaged") -> Any:
         """The network that gives `k_initial_m2` or `k_damaged_m2`, for OpenPNM, SI units.
 
         With fines that is the network of `damage_law_used` of the summary: for "all-spheres" the
-        pores and throats between grains and fines alike, else those between the grains. With
-        `damage_law` = `damage_law_other` of the summary it is the network of the grains, which
-        gives `k_damaged_other_m2`. Where fines appeared to raise the permeability
-        (`all_spheres_above_grains` in `network_counts` is 1), `k_damaged_m2` is the permeability
-        of the grains, and this network has a little more.
+        pores and throats between grains and fines alike, else those between the grains. Where
+        fines appeared to raise the permeability (`all_spheres_above_grains` in `network_counts` is
+        1), `k_damaged_m2` is the permeability of the grains, and this network has a little more.
 
         See `fdnet.report.tables.to_openpnm`; the viscosity is that of the case's fluid. Raises
-        CaseError where OpenPNM is not installed, or the run has no number by that law.
+        CaseError where OpenPNM is not installed.
         """
-        _check_state(state)
-        used, other = (self.summary.get(f"damage_law_{one}") for one in ("used", "other"))
-        if damage_law not in (None, used, other):
-            raise CaseError(
-                f"damage_law: {damage_law!r}, but the run has numbers by "
-                f"{' and '.join(str(one) for one in (used, other) if one)} alone"
-            )
-        if state == "initial" or (damage_law or used) == ALL_SPHERES:
-            analysis, periodic = self.case.analysis, self.case.periodic
-            spheres = self.spheres(state)
-            network = build_network(spheres, periodic=periodic, walls=analysis.walls)
+        analysis, spheres = self.case.analysis, self.spheres(state)
+        if state == "initial" or self.summary.get("damage_law_used") == ALL_SPHERES:
+            network = build_network(spheres, periodic=self.case.periodic, walls=analysis.walls)
             law = LAWS[analysis.law] if state == "initial" else all_conductances
             conductance = law(network)
         else:
-            network, conductance = self.network(), self.conductance(state)
+            network = self.network()
+            conductance = self.throats[f"conductance_{state}_m3"].to_numpy()
         return to_openpnm(network, conductance, viscosity=self.case.fluid.viscosity_Pa_s)
-
-    def network_mesh(self) -> Any:
-        """The network as a pyvista mesh, m: throats as lines, with pressures and conductances.
-
-        It is read from network.vtp, which the stage "report" writes.
-        """
-        return self._read("network.vtp", read_mesh)
-
-    def sphere_mesh(self, state: State = "damaged") -> Any:
-        """The spheres as a pyvista mesh of balls, m, with `kind` (1 grain, 2 fine) to colour them.
-
-        They are read from spheres_damaged.vtp or spheres_initial.vtp, which the stage "report"
-        writes.
-        """
-        _check_state(state)
-        return self._read(f"spheres_{state}.vtp", read_balls)
 
     def _table(self, name: str) -> "pd.DataFrame":
         check_one(self.path, self.manifest, f"{name}.csv", ANALYSE_AGAIN)
@@ -254,11 +220,6 @@ def _with_edges(table: "pd.DataFrame") -> SimpleNamespace:
     return SimpleNamespace(**columns, edges=[*columns["x_lo"], columns["x_hi"][-1]])
 
 
-def _check_state(state: str) -> None:
-    if state not in ("initial", "damaged"):
-        raise CaseError(f"state: {state!r}, expected 'initial' (no fines) or 'damaged'")
-
-
 def open_run(path: str | Path) -> FinishedRun:
     """A finished run, read from its folder.
 
@@ -268,8 +229,8 @@ def open_run(path: str | Path) -> FinishedRun:
     Returns:
         The run, with `summary` (mapping) and its numbers as attributes (`k_damaged_mD`), `plot()`,
         `sections`, `profile`, `pores`, `throats` and `history` (pandas, units in the column names,
-        SI), `spheres()`, `network()`, `to_openpnm()`, `network_mesh()`, `sphere_mesh()`. It prints
-        itself in mD and m2, mm and percent.
+        SI), `spheres()`, `network()` and `to_openpnm()`. It prints itself in mD and m2, mm and
+        percent.
 
     Raises:
         CaseError: there is no folder, it holds no run or an unfinished one, or its records cannot

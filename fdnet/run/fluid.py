@@ -23,6 +23,7 @@ from fdnet.classes.beside_spheres import (
     Stands,
     finer_classes,
 )
+from fdnet.classes.invasion import velocity_in
 from fdnet.dem.checkpoint import Checkpoint, entered_by, time_of
 from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
@@ -67,13 +68,9 @@ _TURN = np.array([-1.0, 1.0, 1.0])
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mirrored:
-    """The fluid of a mirrored specimen, as it acts on the specimen itself.
+    """The fluid of a mirrored specimen, as it acts on the specimen itself."""
 
-    Attributes:
-        fluid: flows along x through the mirrored specimen.
-    """
-
-    fluid: DrivingFluid
+    fluid: DrivingFluid  # flows along x through the mirrored specimen
 
     def keep(self, path: Path) -> None:
         """Nothing: the flow turns back in cases of spheres alone."""
@@ -108,17 +105,11 @@ PARTS = 4
 
 
 class Movers(NamedTuple):
-    """N fines that move.
+    """N fines that move."""
 
-    Attributes:
-        position: (N, 3) m.
-        velocity: (N, 3) m/s.
-        rate: (N,) 1/s, drag coefficient over mass.
-    """
-
-    position: Array
-    velocity: Array
-    rate: Array
+    position: Array  # (N, 3) m
+    velocity: Array  # (N, 3) m/s
+    rate: Array  # (N,) 1/s, drag coefficient over mass
 
     def after(self, time: float, fluid: Array) -> "Movers":
         """The same after `time` s in a `fluid` of constant velocity (N, 3) m/s.
@@ -223,20 +214,14 @@ STANDING = 0.5
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NetworkFluid:
-    """The fluid in a pack whose pores the fines fill.
+    """The fluid in a pack whose pores the fines fill."""
 
-    Attributes:
-        case: what is run.
-        scales: of the case.
-        grains: of the pack, fixed.
-        standing: share of the velocity given below which a fine belongs to the deposit.
-        renewed: share of the deposit that may change before the network is solved anew.
-    """
-
-    case: InvasionCase
-    scales: InvasionScales
-    grains: Snapshot
+    case: InvasionCase  # what is run
+    scales: InvasionScales  # of the case
+    grains: Snapshot  # of the pack, fixed
+    # share of the velocity given below which a fine belongs to the deposit
     standing: float = STANDING
+    # share of the deposit that may change before the network is solved anew
     renewed: float = RENEWED
 
     @property
@@ -345,7 +330,10 @@ class NetworkFluid:
         moving = np.where(within & ~held, crowd, 0.0) / pack.network.area
         slow, gain = float(moving @ shape[:, 0]), float(moving @ fines.velocity[:, 0])
         more = 0.0 if finer is None else self._viscosity * finer.resistance
-        speed = self._velocity(carried, cake + more + slow, gain)
+        speed, own = self.first_velocity, self._viscosity * pack.length / pack.permeability
+        if self.case.drag.drive != "rate":
+            resists, back = (cake + more + slow) / own, gain / own
+            speed = velocity_in(speed, self.rest, carried.k_over_k0, resists, back)
         # drops of pressure as simulated, Pa: of what moves in the pack, and of all that stands
         loose = slow * speed - gain
         drop = self._viscosity * speed * pack.length / pack.permeability / carried.k_over_k0
@@ -436,20 +424,6 @@ class NetworkFluid:
             even_to=float(field.low[0]),
         )
         return mean / pace
-
-    def _velocity(self, carried: Carried, more: float, gain: float = 0.0) -> float:
-        """Superficial velocity U, m/s.
-
-        Cake and moving fines resist with `more` Pa s/m, and the motion of the fines gives back
-        `gain` Pa. At constant pressure, with the resistance R0 = mu L / k0 of the intact pack,
-
-            U = (U0 (1 + rest) + gain / R0) / (k0 / k + rest + more / R0).
-        """
-        if self.case.drag.drive == "rate":
-            return self.first_velocity
-        intact = self._viscosity * self.pack.length / self.pack.permeability
-        resistance = 1.0 / carried.k_over_k0 + self.rest + more / intact
-        return (self.first_velocity * (1.0 + self.rest) + gain / intact) / resistance
 
     @property
     def _viscosity(self) -> float:

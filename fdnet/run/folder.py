@@ -27,7 +27,6 @@ MANIFEST, CASE, LOCK, UNFINISHED = "manifest.json", "case.toml", ".lock", ".unfi
 MARK = ".fdnet-run"
 RECORDS: dict[str, str] = {stage: f"{stage}/stage.json" for stage in LIGGGHTS_STAGES}
 _MARK_TEXT = "fdnet run folder, format 1\n"
-_HALF_MARK = re.compile(r"\.\.fdnet-run\.\d+\.part")
 
 
 # ------------------------------------------------------------------------------------------------
@@ -136,44 +135,10 @@ OUTPUTS = {
     ),
 }
 """Files and folders that each stage writes, below the run folder."""
-OPTIONAL = ("layers.csv", "history.csv", *SOME_TABLES, "formation")
-"""Those of them that a finished stage may lack; `formation` is of `fdnet core` and `well`."""
-
-
-class _Execution(JsonObject):
-    """One execution of LIGGGHTS."""
-
-    version: str
-    seconds: float
-    waited: float = 0.0
-    cpu_seconds: float = 0.0
-    peak_memory_bytes: int | None = None
-
-
-class _Attempt(JsonObject):
-    """One attempt at the porosity of a pack."""
-
-    liggghts_s: float
-    liggghts_cpu_s: float = 0.0
-
-
-class _Updates(JsonObject):
-    """How often a flow was computed anew."""
-
-    count: int
-    momentum_open: int = 0
-    momentum_defect_most: float = 0.0
-
-
-class _Springs(JsonObject):
-    """The last time step, and the stiffness of the stiffest contact at first and last."""
-
-    dem_dt_last_s: float
-    stiffness_N_m: list[float]
 
 
 class StageRecord(JsonObject):
-    """What the record of every stage holds."""
+    """What the record of every stage holds; `runs` are those of LIGGGHTS."""
 
     format: Literal[1]
     digest: str
@@ -184,38 +149,8 @@ class StageRecord(JsonObject):
     dt_s: float
     ranks: int
     files: Annotated[Mapping[str, str], Field(min_length=1)]
-    runs: list[_Execution]
+    runs: list[dict[str, Any]]
     left_out: list[str]
-
-
-class PackRecord(StageRecord):
-    """The record of a pack."""
-
-    porosity: float
-    porosity_assumed: float
-    creep_m_s: float = 0.0
-    restless: int = 0
-    attempts: Annotated[list[_Attempt], Field(min_length=1)]
-    runs: Annotated[list[_Execution], Field(min_length=1)]
-
-
-class InvadeRecord(StageRecord):
-    """The record of an invasion; one that was cut after its last checkpoint names no run."""
-
-    stop_reason: str
-    max_overlap_step: int | None = None
-    supplied: int
-    updates: _Updates | None = None
-    springs: _Springs | None = None
-    warnings: list[str]
-
-
-class CleanUpRecord(StageRecord):
-    """The record of a clean-up."""
-
-    stop_reason: str
-    physical_time_s: float
-    warnings: list[str]
 
 
 class Manifest(JsonObject):
@@ -226,14 +161,9 @@ class Manifest(JsonObject):
     stages: list[str]
     digests: Mapping[str, str] = {}
     files: Annotated[Mapping[str, str], Field(min_length=1)]
-    invade: InvadeRecord | None
+    invade: StageRecord | None
 
 
-_MODELS: dict[str, type[JsonObject]] = {
-    "pack": PackRecord,
-    "invade": InvadeRecord,
-    "clean_up": CleanUpRecord,
-}
 ANEW = "start over with --force"
 
 
@@ -243,29 +173,16 @@ def read_record(folder: Path, stage: str) -> dict[str, Any] | None:
     Raises CaseError when it cannot be understood.
     """
     path, noun = folder / RECORDS[stage], "record of a stage"
-    return read_json(path, _MODELS[stage], noun=noun, advice=ANEW) if path.exists() else None
+    return read_json(path, StageRecord, noun=noun, advice=ANEW) if path.exists() else None
 
 
 def read_manifest(folder: Path) -> dict[str, Any] | None:
     """The manifest of the analysed run in `folder`, or None.
 
-    Raises CaseError when it cannot be understood, or when a file that it implies is missing.
+    Raises CaseError when it cannot be understood.
     """
-    path = folder / MANIFEST
-    if not path.exists():
-        return None
-    manifest = read_json(path, Manifest, noun="manifest of a run", advice=ANALYSE_AGAIN)
-    for stage in STAGES[:4]:
-        if stage not in manifest["stages"] or (stage == "invade" and manifest["invade"] is None):
-            continue
-        record = RECORDS.get(stage)
-        for name in [record] if record else OUTPUTS[stage]:
-            if name not in OPTIONAL and not (folder / name).exists():
-                raise CaseError(
-                    f"{folder}: the run is complete by its {MANIFEST}, but {name} is missing; "
-                    f"{ANEW}"
-                )
-    return manifest
+    path, noun = folder / MANIFEST, "manifest of a run"
+    return read_json(path, Manifest, noun=noun, advice=ANALYSE_AGAIN) if path.exists() else None
 
 
 def finished_manifest(folder: Path) -> tuple[dict[str, Any], Case]:
@@ -336,23 +253,17 @@ def is_run_folder(folder: Path) -> bool:
     """
     if _holds_mark(folder):
         return True
-    models: dict[str, type[JsonObject]] = {MANIFEST: Manifest} | {
-        RECORDS[stage]: model for stage, model in _MODELS.items()
-    }
-    for name, model in models.items():
+    for name in (MANIFEST, *RECORDS.values()):
         with suppress(CaseError):
+            model = Manifest if name == MANIFEST else StageRecord
             read_json(folder / name, model, noun="", advice="")
             return True
     return False
 
 
 def is_unused(folder: Path) -> bool:
-    """Whether `folder` is empty but for the empty lock and half mark of a session just killed."""
-    return all(
-        (child.name == LOCK and child.is_file() and child.stat().st_size == 0)
-        or _HALF_MARK.fullmatch(child.name) is not None
-        for child in folder.iterdir()
-    )
+    """Whether `folder` is empty but for the empty lock of a session just killed."""
+    return all(child.name == LOCK and child.stat().st_size == 0 for child in folder.iterdir())
 
 
 _OWN = (CASE, MANIFEST, UNFINISHED, LOCK, MARK)
@@ -361,19 +272,12 @@ _OWN = (CASE, MANIFEST, UNFINISHED, LOCK, MARK)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunFolder:
-    """A run folder whose lock this process holds.
+    """A run folder whose lock this process holds."""
 
-    Attributes:
-        path: of the folder.
-        lock: descriptor of the locked file.
-        was_empty: whether it was empty, or not there, before.
-        made: folders that were made for it, innermost first.
-    """
-
-    path: Path
-    lock: int
-    was_empty: bool
-    made: tuple[Path, ...]
+    path: Path  # of the folder
+    lock: int  # descriptor of the locked file
+    was_empty: bool  # whether it was empty, or not there, before
+    made: tuple[Path, ...]  # folders that were made for it, innermost first
 
     def record(self, stage: str) -> dict[str, Any] | None:
         """The record of a finished stage ("pack", "invade"), or None.
@@ -386,13 +290,9 @@ class RunFolder:
         """Mark a stage as done: its record is only there when the stage is complete."""
         _write_json(self.path / RECORDS[stage], record)
 
-    def manifest(self) -> dict[str, Any] | None:
-        """The manifest of the run, or None. Raises CaseError as `read_manifest` does."""
-        return read_manifest(self.path)
-
     def holds(self, case: Case, stages: tuple[str, ...]) -> bool:
-        """Whether all of `stages` are done. Raises CaseError as `manifest` and `record` do."""
-        manifest = self.manifest()
+        """Whether all of `stages` are done. Raises CaseError as `read_manifest` does."""
+        manifest = read_manifest(self.path)
         if manifest is not None:
             asked = [stage for stage in stages if stage in (*case.stages, "invade")]
             return set(asked) <= set(manifest["stages"])
@@ -573,7 +473,7 @@ def _admit(
             f"{folder.path}: holds an unfinished run; continue it with --resume or start over "
             "with --force"
         )
-    if force or folder.manifest() is None:
+    if force or read_manifest(folder.path) is None:
         write_text(folder.path / UNFINISHED, " ".join(stages) + "\n")
     if force or not written.exists() or not folder.holds(case, stages):
         write_text(written, case.toml())

@@ -3,13 +3,12 @@
 import shlex
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case, recorded_case, set_keys
-from fdnet.dem.deck import snapshot_of
 from fdnet.errors import CaseError, explained
 from fdnet.files import write_text
 from fdnet.mechanics.of_case import (
@@ -23,24 +22,17 @@ from fdnet.mechanics.of_case import (
 from fdnet.mechanics.triaxial import LoadStep, Triaxial, triaxial
 from fdnet.report.html import put_mechanics
 from fdnet.report.tables import plain_json, write_rows
-from fdnet.run.folder import CASE, START_OVER, check_files, is_run_folder, read_record
-from fdnet.run.records import PACK_DUMP, RunOptions
-from fdnet.spheres.dump import read_frame
+from fdnet.run.dem_stages import packed_grains
+from fdnet.run.folder import CASE, is_run_folder, read_record
+from fdnet.run.records import RunOptions
 from fdnet.spheres.snapshot import Snapshot
 
 FOLDER, NUMBERS, CURVE = "mechanics", "mechanics.json", "stress_strain.csv"
 """Folder of the mechanics in a run folder, the file with its numbers, the curve of a test."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Packed:
-    """A case and its grains at rest.
-
-    Attributes:
-        case: what was packed.
-        grains: as packed.
-        folder: the run folder.
-    """
+class Packed(NamedTuple):
+    """A case, its grains at rest, and the run folder."""
 
     case: Case
     grains: Snapshot
@@ -76,17 +68,14 @@ def packed_case(source: Path, options: RunOptions, assignments: list[str]) -> Pa
             from fdnet.run.pipeline import run_stages
 
             run_stages(case, replace(options, out=folder, stages=("pack",)))
-    record = read_record(folder, "pack") or {}
-    frame = read_frame(folder / "pack" / PACK_DUMP)
-    check_files(folder / "pack", record, START_OVER)
-    recorded = recorded_case(folder / CASE).grains
+    recorded, record = recorded_case(folder / CASE).grains, read_record(folder, "pack") or {}
     same = case.grains.model_copy(update={key: getattr(recorded, key) for key in _SPRINGS})
     if record["digest"] != case.model_copy(update={"grains": same}).digest("pack"):
         raise CaseError(
             f"{folder}: its pack belongs to another case; give another --out, or leave out --set "
             "of keys that change the pack"
         )
-    return Packed(case=case, grains=snapshot_of(frame, case, time_s=0.0), folder=folder)
+    return Packed(case=case, grains=packed_grains(folder, case), folder=folder)
 
 
 def measure_elastic(packed: Packed, pressure_Pa: float | None) -> dict[str, Any]:

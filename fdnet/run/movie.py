@@ -1,4 +1,4 @@
-"""Movies and pictures of a finished run: its fines, the flux of its throats, or streamlines."""
+"""Movies and pictures of a finished run: its fines, or with them the flux of its throats."""
 
 import shlex
 import sys
@@ -13,60 +13,32 @@ from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
 from fdnet.files import refuse_present
 from fdnet.names import SECTION_ARCHIE
-from fdnet.network.field.field import streamlines, velocity_field
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
-from fdnet.network.specimen import cake_of
+from fdnet.network.network import Network
 from fdnet.report.picture import MovieFrame, Scene, refuse_suffix, write_movie
-from fdnet.report.vtk import (
-    refuse_without_view,
-    write_flux_vtp,
-    write_lines_vtp,
-    write_spheres_vtp,
-)
+from fdnet.report.vtk import refuse_without_view, write_flux_vtp, write_spheres_vtp
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import ANALYSE_AGAIN, check_finished, check_one, frames_in, frames_of
-from fdnet.spheres.geometry import wrapped
 from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Array, Snapshot
 
-LINES = 200
-"""About so many streamlines, evenly spaced in the mud: each carries the same flow."""
-FIELD_CELLS = 14.0
-"""Cells across a grain: fewer lose more lines among the fines, more take minutes."""
-STEP, AHEAD = 0.02, 0.3
-"""Step along a streamline, and how far before the deposit it begins, in diameters of a grain."""
 BRIGHTEST, DECADES = 99.5, 2.0
 """Percentile of the first values at which the colours end, and how many decades they show."""
+FluxOf = Callable[[Snapshot, float | None], tuple[Array, float]]
+"""From the fines (none: the clean specimen) and the rate over the first (None: not known) to the
+flux (T,) of the throats in percent of the first flow, and k over that of the clean specimen."""
 
 
-class DrawnFlow(NamedTuple):
-    """The flow at one state, ready to be drawn.
-
-    Attributes:
-        values: what is coloured, one array.
-        k_over_k0: permeability over that of the clean specimen; None where it is not measured.
-        write: writes the lines with their values to a path.
-    """
-
-    values: Array
-    k_over_k0: float | None
-    write: Callable[[Path], Any]
-
-
-FlowOf = Callable[[Snapshot, float | None], DrawnFlow]
-"""From the fines (none: the clean specimen) and the rate over the first (None: not known)."""
-
-
-def flux_of(run: FinishedRun) -> FlowOf:
-    """The flux of each throat in percent of the first flow through the specimen.
+def flux_of(run: FinishedRun, network: Network) -> FluxOf:
+    """How the flux of each throat in the network of a run follows from the fines.
 
     The laws are those of the run; where it measured the damage in two ways, that of the throats.
     Where no rate is known it is the one at the first pressure drop. Fines that still move count
     as deposit.
     """
-    network, choices = run.network(), run.case.analysis
+    choices = run.case.analysis
     clean = LAWS[choices.law](network)
     first = solve_flow(network, clean)
     names = (str(run.summary.get(f"damage_law_{which}")) for which in ("other", "used"))
@@ -76,7 +48,7 @@ def flux_of(run: FinishedRun) -> FlowOf:
         middle_band=choices.middle_band,
     )
 
-    def flow_of(fines: Snapshot, rate: float | None) -> DrawnFlow:
+    def flux(fines: Snapshot, rate: float | None) -> tuple[Array, float]:
         flow = first
         if len(fines):
             occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
@@ -84,56 +56,9 @@ def flux_of(run: FinishedRun) -> FlowOf:
         k = flow.inflow / first.inflow if first.inflow > 0 else 0.0
         flux = np.abs(flow.throat_flux)
         share = flux / flow.inflow if flow.inflow > 0 else 0.0 * flux
-        values = 100.0 * share * (k if rate is None else rate)
-        return DrawnFlow(values, k, lambda path: write_flux_vtp(path, network, values))
+        return 100.0 * share * (k if rate is None else rate), k
 
-    return flow_of
-
-
-def streamlines_of(run: FinishedRun, *, cells: float = FIELD_CELLS) -> FlowOf:
-    """Streamlines of the resolved flow around grains and deposit, with the speed of the fluid.
-
-    The speed is over the first superficial velocity; where no rate is known, over the present
-    one. The deposit is all fines in the specimen, and the cake.
-    """
-    grains, sides = run.spheres("initial").grains(), run.case.periodic
-
-    def flow_of(fines: Snapshot, rate: float | None) -> DrawnFlow:
-        deposit = fines
-        if len(fines):
-            cake = cake_of(grains.joined(fines), sides)
-            deposit = fines.where(fines.position[:, 0] >= grains.box[0, 0])
-            deposit = deposit.joined(cake) if len(cake) else deposit
-        field = velocity_field(grains, periodic=sides, fines=deposit, cells=cells)
-        diameter = 2.0 * float(grains.radius.mean())
-        front = float(np.min(deposit.position[:, 0] - deposit.radius, initial=grains.box[0, 0]))
-        start = _starts(grains.box, front - AHEAD * diameter)
-        ways = streamlines(field, start, step=STEP * diameter, until=float(grains.box[0, 1]))
-        pieces = [piece for way in ways for piece in _pieces(way, grains.box, sides)]
-        present = 1.0 if rate is None else rate
-        lines = [(piece, present * np.linalg.norm(field.at(piece), axis=1)) for piece in pieces]
-        values = np.concatenate([values for _, values in lines])
-        return DrawnFlow(values, None, lambda path: write_lines_vtp(path, lines))
-
-    return flow_of
-
-
-def _starts(box: Array, depth: float) -> Array:
-    """Points (N, 3) m, evenly over the cross-section at x = `depth`."""
-    (y0, y1), (z0, z1) = box[1:]
-    apart = np.sqrt((y1 - y0) * (z1 - z0) / LINES)
-    across, up = max(1, round((y1 - y0) / apart)), max(1, round((z1 - z0) / apart))
-    y = y0 + (np.arange(across) + 0.5) * (y1 - y0) / across
-    z = z0 + (np.arange(up) + 0.5) * (z1 - z0) / up
-    at_y, at_z = np.meshgrid(y, z)
-    return np.column_stack([np.full(at_y.size, depth), at_y.ravel(), at_z.ravel()])
-
-
-def _pieces(way: Array, box: Array, sides: tuple[bool, bool, bool]) -> list[Array]:
-    """A line (M, 3) m cut where it passes a periodic side, each piece inside the box."""
-    inside = wrapped(way, box, sides)
-    jump = np.any(np.abs(np.diff(inside - way, axis=0)) > 0.5 * np.ptp(box, axis=1), axis=1)
-    return [piece for piece in np.split(inside, np.flatnonzero(jump) + 1) if len(piece) > 1]
+    return flux
 
 
 def colour_limits(values: Array) -> tuple[float, float]:
@@ -150,12 +75,8 @@ def colour_limits(values: Array) -> tuple[float, float]:
 
 LEAST, MOST = 0.5, 30.0
 """Frames a second that a movie may have."""
-SHOWN = {
-    "fines": "",
-    "flux": "flux of a throat,\n% of the first flow",
-    "streamlines": "speed over the first\nsuperficial velocity",
-}
-"""What can be shown, and the title of its colours."""
+TITLE = "flux of a throat,\n% of the first flow"
+"""Of the colours."""
 
 
 class DrawnState(NamedTuple):
@@ -191,22 +112,22 @@ def movie_of(
     target: Path | None = None,
     *,
     per_second: float = 4.0,
-    show: str = "fines",
+    flux: bool = False,
     force: bool = False,
     progress: bool = False,
 ) -> Path:
     """Write the invasion of the run in `folder` as a movie; returns its path.
 
     `target` ends in .gif or .mp4 and is invasion.gif in the run folder without it. With .png it is
-    one picture of the specimen before and after. `show` is a key of `SHOWN`. With `progress`,
-    standard error says how far the drawing is. Raises CaseError where the folder is no finished
-    run with fines and frames, one of its files was changed, a file is there that `force` does not
-    allow to replace, VTK is missing, or nothing can be drawn.
+    one picture of the specimen before and after. With `flux` the throats are drawn too. With
+    `progress`, standard error says how far the drawing is.
+
+    Raises CaseError where the folder is no finished run with fines and frames, one of its files
+    was changed, a file is there that `force` does not allow to replace, VTK is missing, or nothing
+    can be drawn.
     """
     if not LEAST <= per_second <= MOST:
         raise CaseError(f"--fps: {per_second:g}, expected {LEAST:g} to {MOST:g} frames a second")
-    if show not in SHOWN:
-        raise CaseError(f"--show: {show!r} is not known; choose one of {sorted(SHOWN)}")
     run = open_run(folder)
     path = target or run.path / "invasion.gif"
     refuse_suffix(path)
@@ -220,24 +141,23 @@ def movie_of(
     box = np.array([(0.0, side) for side in run.case.size_m])
     frames, limits = [], (0.0, 0.0)
     with tempfile.TemporaryDirectory() as work:
-        none = run.spheres("initial").fines()
+        none, network = run.spheres("initial").fines(), run.network() if flux else None
         empty = write_spheres_vtp(Path(work, "none.vtp"), none)
-        flow_of = {"flux": flux_of, "streamlines": streamlines_of}.get(show, lambda _: None)(run)
+        fluxes = None if network is None else flux_of(run, network)
         for number, one in enumerate(moments):
             spheres = one.spheres or empty
-            if flow_of is None:
+            if fluxes is None:
                 frames.append(MovieFrame(spheres, one.words()))
                 continue
             if progress:
                 print(f"movie: flow of state {number + 1} of {len(moments)}", file=sys.stderr)
-            flow = flow_of(
-                read_spheres(spheres, box=box).fines() if one.spheres else none, one.rate
-            )
-            limits = limits if number else colour_limits(flow.values)
-            lines = Path(work, f"lines_{number:04d}.vtp")
-            flow.write(lines)
-            frames.append(MovieFrame(spheres, one.words(flow.k_over_k0), lines))
-        scene = Scene(grains=still, box=box, title=SHOWN[show], limits=limits, told=progress)
+            fines = read_spheres(spheres, box=box).fines() if one.spheres else none
+            values, k_over_k0 = fluxes(fines, one.rate)
+            limits = limits if number else colour_limits(values)
+            lines = write_flux_vtp(Path(work, f"lines_{number:04d}.vtp"), network, values)
+            frames.append(MovieFrame(spheres, one.words(k_over_k0), lines))
+        title = TITLE if flux else ""
+        scene = Scene(grains=still, box=box, title=title, limits=limits, told=progress)
         return write_movie(path, frames, scene, per_second=per_second)
 
 

@@ -23,12 +23,7 @@ from fdnet.network.fines.deposit import (
 from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.laws.lubrication import half_resistances
-from fdnet.network.laws.section_archie import (
-    KeptSections,
-    ThroatPart,
-    measured_sections,
-    parts_of,
-)
+from fdnet.network.laws.section_archie import KeptSections, ThroatPart, measured_sections, parts_of
 from fdnet.network.network import Network, build_network
 from fdnet.spheres.geometry import neighbour_tree, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot, frozen
@@ -44,15 +39,10 @@ def bed_section(network: Network) -> Array:
 
 
 class Pressed(NamedTuple):
-    """Forces of the fluid over the drop of pressure, m2.
+    """Forces of the fluid over the drop of pressure, m2."""
 
-    Attributes:
-        grains: (3,) on all grains.
-        groups: (G, 3) on the fines in each pore; pores of one group are one.
-    """
-
-    grains: Array
-    groups: Array
+    grains: Array  # (3,) on all grains
+    groups: Array  # (G, 3) on the fines in each pore; pores of one group are one
 
 
 def on_each_fine(pressed: Pressed, deposit: KeptDeposit) -> Array:
@@ -96,53 +86,33 @@ velocity over the superficial one that it leaves at the walls (docs/theory/resol
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Carried:
-    """What the pores (P) of a damaged pack still carry.
+    """What the pores (P) of a damaged pack still carry."""
 
-    Attributes:
-        k_over_k0: permeability over that of the intact pack.
-        ratio: (P,) flux over that of the intact pack at the same rate through the specimen.
-        stagnant: number of pores that carry next to nothing when clean; their ratio is 1.
-        pressed: forces of the fluid on grains and fines over the drop of pressure.
-        flow: through the damaged network.
-    """
-
-    k_over_k0: float
-    ratio: Array
-    stagnant: int
-    pressed: Pressed
-    flow: Flow
+    k_over_k0: float  # permeability over that of the intact pack
+    ratio: Array  # (P,) flux over that of the intact pack at the same rate through the specimen
+    stagnant: int  # number of pores that carry next to nothing when clean; their ratio is 1
+    pressed: Pressed  # forces of the fluid on grains and fines over the drop of pressure
+    flow: Flow  # through the damaged network
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PackFlow:
-    """The intact pack: its network, its flow, and its resolved velocity field.
+    """The intact pack: its network, its flow, and its resolved velocity field."""
 
-    Attributes:
-        network: pores and throats of the grains.
-        clean: (T,) m3, conductances.
-        halves: (T, 2) 1/m3, resistances of the sides of the clean throats; 0 where infinite.
-        facet_area: (T, 3) m2, area of the facet inside the box times its normal, from the first
-            to the second pore.
-        bed_share: (T, 2) share of it on which a bed of fines in either side is pressed.
-        holders: the pores, which hold the deposit.
-        parts: what the damage of the throats needs and does not depend on the fines.
-        flow: through the clean network.
-        through: (P,) share of the inflow that each pore carries.
-        shape: resolved velocity field of the grains.
-        tree: search tree of the places of the pores.
-    """
-
-    network: Network
-    clean: Array
-    halves: Array
+    network: Network  # pores and throats of the grains
+    clean: Array  # (T,) m3, conductances
+    halves: Array  # (T, 2) 1/m3, resistances of the sides of the clean throats; 0 where infinite
+    # (T, 3) m2, area of the facet inside the box times its normal, from the first to the second
+    # pore
     facet_area: Array
-    bed_share: Array
-    holders: Holders
+    bed_share: Array  # (T, 2) share of it on which a bed of fines in either side is pressed
+    holders: Holders  # the pores, which hold the deposit
+    # what the damage of the throats needs and does not depend on the fines
     parts: Sequence[ThroatPart]
-    flow: Flow
-    through: Array
-    shape: VelocityField
-    tree: Any
+    flow: Flow  # through the clean network
+    through: Array  # (P,) share of the inflow that each pore carries
+    shape: VelocityField  # resolved velocity field of the grains
+    tree: Any  # search tree of the places of the pores
 
     @property
     def length(self) -> float:
@@ -281,25 +251,16 @@ m3 of the spheres in the pores."""
 
 @dataclass(slots=True, eq=False)
 class Renewal:
-    """What a damaged pack carries: its deposit followed, its network solved when enough changed.
+    """What a damaged pack carries; its network is solved when enough of the deposit changed."""
 
-    Attributes:
-        pack: the intact pack.
-        renewed: share of the deposit that may change before the network is solved anew.
-        solved: the fines of the last solve; None before the first.
-        deposit: the fines as they are measured.
-        sections: of the throats, as they were at the last solve.
-        carried: what the last solve gave.
-        solves: number of solves.
-    """
-
-    pack: PackFlow
+    pack: PackFlow  # the intact pack
+    # share of the deposit that may change before the network is solved anew
     renewed: float = RENEWED
-    solved: Snapshot | None = None
-    deposit: KeptDeposit | None = None
-    sections: KeptSections | None = None
-    carried: Carried | None = None
-    solves: int = 0
+    solved: Snapshot | None = None  # the fines of the last solve; None before the first
+    deposit: KeptDeposit | None = None  # the fines as they are measured
+    sections: KeptSections | None = None  # of the throats, as they were at the last solve
+    carried: Carried | None = None  # what the last solve gave
+    solves: int = 0  # number of solves
 
     def of(
         self, fines: Snapshot, *, anew: bool, finer: Finer | None = None

@@ -21,14 +21,7 @@ from fdnet.report.picture import render_spheres_png
 from fdnet.report.tables import millimetres
 from fdnet.report.text import cake_words
 from fdnet.run.bridging import CLOGGED, ratio_rows
-from fdnet.run.cake import (
-    HALF_HOUR,
-    cake_rows,
-    cake_share,
-    cake_summary,
-    fit_filtration,
-    measure_cake,
-)
+from fdnet.run.cake import cake_rows, cake_summary, measure_cake
 from fdnet.run.clean_up import Returned, clean_up_rows, clean_up_summary
 from fdnet.run.fluid import history_rows
 from fdnet.run.records import FinishedInvasion
@@ -46,28 +39,18 @@ MOST_FRAMES = 24
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Results:
-    """The results of a run and where they go.
+    """The results of a run and where they go."""
 
-    Attributes:
-        path: run folder.
-        grains: as packed.
-        invasion: None when the case has no fines.
-        analysis: permeability, porosity and fines of the specimen.
-        sizes: of grains and fines with measured curves.
-        cleaned: what the clean-up gave; None without one.
-        added: results that only some runs have.
-        numbers: of the summary, that only size classes give.
-        finer: fines of classes beside the spheres of LIGGGHTS; None without any.
-    """
-
-    path: Path
-    grains: Snapshot
-    invasion: FinishedInvasion | None
-    analysis: "Analysis"
-    sizes: tuple[PlacedSizes, ...] = ()
-    cleaned: Returned | None = None
-    added: tuple[Added, ...] = ()
+    path: Path  # run folder
+    grains: Snapshot  # as packed
+    invasion: FinishedInvasion | None  # None when the case has no fines
+    analysis: "Analysis"  # permeability, porosity and fines of the specimen
+    sizes: tuple[PlacedSizes, ...] = ()  # of grains and fines with measured curves
+    cleaned: Returned | None = None  # what the clean-up gave; None without one
+    added: tuple[Added, ...] = ()  # results that only some runs have
+    # of the summary, that only size classes give
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    # fines of classes beside the spheres of LIGGGHTS; None without any
     finer: Snapshot | None = None
 
     @property
@@ -296,41 +279,17 @@ def _filtrate(one: FinishedInvasion) -> Iterator[Added]:
     updates, pace = one.rows or one.updates, 1.0 if one.rows else one.scales.force_factor
     if not updates or "filtrate_m3" not in updates[-1]:
         return
-    area = one.case.size_m[1] * one.case.size_m[2]
     time = pace * np.array([row["time_s"] for row in updates])
-    volume = np.array([row["filtrate_m3"] for row in updates]) / area
-    fit = fit_filtration(time, volume, cake_share(updates) or 0.0)
-    if fit is None:
-        return
-    usable = not fit.unsupported
-    said = f"30 minutes by extrapolation: {1e3 * fit.half_hour:.3g} mm"
+    volume = np.array([row["filtrate_m3"] for row in updates])
     yield Added(
         name="filtrate",
-        summary={
-            "spurt_m3_m2": fit.spurt if usable else None,
-            "volume_30min_m3_m2": fit.half_hour if usable else None,
-            "filtrate_fit": {
-                "a_s_m2": fit.a,
-                "b_s_m": fit.b,
-                "c_s": fit.c,
-                "intercept_m3_m2": fit.intercept if usable else None,
-                "misfit": fit.misfit,
-                "until_s": fit.until,
-                "extrapolated_by": HALF_HOUR / fit.until,
-                "unsupported": fit.unsupported,
-            },
-        },
         fill=partial(
             figures.fill_filtrate,
             time=time,
-            volume=volume,
-            fitted=np.array([fit.volume(at) for at in time]) if usable else None,
-            said=said if usable else "no extrapolation",
+            volume=volume / (one.case.size_m[1] * one.case.size_m[2]),
         ),
         caption="Filtrate per area of the face against the root of time. A cake that grows at "
-        "constant pressure makes t quadratic in V; where the history is that, it is extrapolated "
-        f"from {fit.until:.2g} s to 30 minutes."
-        + ("" if usable else f" Here it is not: {fit.unsupported}."),
+        "constant pressure and resists far more than the pack gives a straight line.",
     )
 
 

@@ -3,8 +3,9 @@
 Each stage is kept when it is done and continued when it was cut.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,6 @@ from fdnet.names import AUTO, DEFAULT_LAW, LIGGGHTS_STAGES, STAGES, off_by_facto
 from fdnet.network.warm_up import compiling
 from fdnet.report import html, tables
 from fdnet.report.text import case_words, thesis_law_warning
-from fdnet.run.answer import with_answer
 from fdnet.run.by_classes import (
     analysed_classes,
     class_model,
@@ -29,9 +29,8 @@ from fdnet.run.by_classes import (
     read_classes,
     spheres_at_the_end,
 )
-from fdnet.run.clean_up import Returned, clean_up_stage, compared, returned
+from fdnet.run.clean_up import clean_up_stage, compared, returned
 from fdnet.run.dem_stages import (
-    file_warnings,
     invade_stage,
     invaded,
     invasion_record,
@@ -45,18 +44,17 @@ from fdnet.run.folder import (
     SOME_TABLES,
     START_OVER,
     TABLES,
-    RunFolder,
     check_files,
     check_finished,
     digests_of,
     frames_in,
     open_folder,
+    read_manifest,
 )
 from fdnet.run.outputs import (
     Results,
     draw_figures,
     placed_sizes,
-    size_numbers,
     with_added,
     write_paraview,
     write_tables,
@@ -66,28 +64,22 @@ from fdnet.run.records import (
     Session,
     cores,
     finer_file,
-    record_warnings,
     stage_costs,
-    stage_seconds,
-    versions,
 )
 from fdnet.run.stokes_sections import report_section
 from fdnet.run.summary import summarise
-from fdnet.scales.check import every_finding
 from fdnet.scales.cost import over_limit
 from fdnet.scales.pack import grain_count, refuse_unreachable
-from fdnet.scales.scales import (
-    InvasionScales,
-    Scales,
-    back_flow,
-    invasion_scales,
-    scales_of,
-)
+from fdnet.scales.scales import InvasionScales, Scales, back_flow, invasion_scales, scales_of
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Directions, Snapshot
 
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
+
+
+Records = Mapping[str, dict[str, Any] | None]
+"""Of the stages of LIGGGHTS: "pack", "invade" (None without fines), and "clean_up" if any."""
 
 
 def run_case(
@@ -171,9 +163,10 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
     )
     try:
         session = Session(case=case, scales=scales_of(case), folder=folder, options=options)
-        if folder.manifest() is not None and folder.holds(case, options.stages):
+        if read_manifest(folder.path) is not None and folder.holds(case, options.stages):
             check_finished(folder.path)
-            return _read_summary(folder)
+            path = folder.path / "summary.json"
+            return tables.read_summary(path) if path.exists() else {}
         return _carry_out(session)
     except CaseError as error:
         left = folder.discard()
@@ -248,16 +241,11 @@ def _refused(check: Callable[..., object], *arguments: Any) -> Iterator[str]:
         yield str(error)
 
 
-def _read_summary(folder: RunFolder) -> dict[str, Any]:
-    path = folder.path / "summary.json"
-    return tables.read_summary(path) if path.exists() else {}
-
-
 def _carry_out(session: Session) -> dict[str, Any]:
     import fdnet.network.permeability  # noqa: F401  a library that is missing is named first
 
     stages = session.options.stages
-    if session.folder.manifest() is not None:
+    if read_manifest(session.path) is not None:
         session.folder.clear(tuple(stage for stage in ("analyse", "report") if stage in stages))
     else:  # a provisional analysis may be there
         session.folder.clear(("analyse", "report"))
@@ -275,50 +263,44 @@ def _carry_out(session: Session) -> dict[str, Any]:
     if not analysed:
         session.folder.complete(None)
         return {}
-    record = session.folder.record("pack")
-    if record is None:
-        raise CaseError(f"{session.path}: no finished pack here; run the stage pack first")
-    summary = _analyse_and_report(session, record)
-    if session.folder.record("invade") is not None or not isinstance(session.case, InvasionCase):
-        session.folder.complete(_manifest(session, record))
+    case = session.case
+    records = {
+        "pack": session.folder.record("pack"),
+        "invade": invasion_record(session, case) if isinstance(case, InvasionCase) else None,
+    }
+    if "clean_up" in case.stages:
+        records["clean_up"] = session.folder.record("clean_up")
+    summary = _analyse_and_report(session, records)
+    if summary["stop_reason"] != "unfinished":
+        session.folder.complete(_manifest(session, records, summary))
     return summary
 
 
-def _clean_up_record(session: Session) -> dict[str, Any] | None:
-    """The record of the clean-up; None of a case without one."""
-    return session.folder.record("clean_up") if "clean_up" in session.case.stages else None
-
-
-def _manifest(session: Session, pack: dict[str, Any]) -> dict[str, Any]:
-    invasion, cleaned = session.folder.record("invade"), _clean_up_record(session)
-    done = [stage for stage in STAGES if cleaned or stage != "clean_up"]
-    frames = frames_in(session.path).values()
-    names = [*TABLES, *SOME_TABLES, *MESHES, *frames, *RECORDS.values()]
+def _manifest(session: Session, records: Records, summary: Mapping[str, Any]) -> dict[str, Any]:
+    case, folder = session.case, session.path
+    done = [stage for stage in STAGES if stage in (*records, "analyse", "report")]
+    names = [*TABLES, *SOME_TABLES, *MESHES, *frames_in(folder).values(), *RECORDS.values()]
     return {
-        "case": session.case.name,
-        "digests": {stage: session.case.digest(stage) for stage in done if stage != "report"},
-        "seed": session.case.seed,
+        "case": case.name,
+        "digests": {stage: case.digest(stage) for stage in done if stage != "report"},
+        "seed": case.seed,
         "stages": [s for s in done if s != "report" or s in session.options.stages],
         "command": session.options.command,
-        "seconds": stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
-        "versions": versions(pack),
-        "files": digests_of(session.path, names),
-        "pack": pack,
-        "invade": invasion,
-        **({"clean_up": cleaned} if cleaned else {}),
+        "seconds": stage_costs(records, session)["seconds"],
+        "versions": session.versions(),
+        "files": digests_of(folder, names),
+        **records,
     }
 
 
-def _analyse_and_report(session: Session, pack: dict[str, Any]) -> dict[str, Any]:
+def _analyse_and_report(session: Session, records: Records) -> dict[str, Any]:
     """Tables and the summary, which is given out before figures and report are made of them."""
-    case, cleaned = session.case, _clean_up_record(session)
-    invasion = invasion_record(session, case) if isinstance(case, InvasionCase) else None
     with session.timed("analyse"):
-        results = with_added(_analysed(session, invasion, returns=cleaned is not None), cleaned)
+        results = with_added(_analysed(session, records), records.get("clean_up"))
         write_tables(results)
-    summary = _summary(session, results, pack, invasion, cleaned)
-    stages = (pack, invasion, cleaned)
-    summary |= stage_costs(stages, session.cpu_seconds)
+    steps = {f"analyse_{name}": value for name, value in results.analysis.seconds.items()}
+    summary = summarise(session, results, records)
+    summary["seconds"] |= steps
     summary = tables.write_summary(session.path / "summary.json", summary)
     session.options.answered(summary)
     if "report" in session.options.stages:
@@ -326,61 +308,48 @@ def _analyse_and_report(session: Session, pack: dict[str, Any]) -> dict[str, Any
             lacking = write_paraview(results)
             figures, notes = draw_figures(results, solid=not lacking)
         summary["warnings"] += [explained(note) for note in lacking + notes]
-        summary["seconds"] |= {"report": session.seconds["report"]}
-        summary |= stage_costs(stages, session.cpu_seconds)
+        summary |= stage_costs(records, session)
+        summary["seconds"] |= steps
         tables.write_summary(session.path / "summary.json", summary)
-        _write_page(session, results, summary, figures, versions(pack))
+        _write_page(session, results, summary, figures)
     return summary
 
 
-def _analysed(session: Session, record: dict[str, Any] | None, *, returns: bool) -> Results:
-    """The specimen before, after the invasion of this `record`, and after its clean-up if any."""
-    from fdnet.network.permeability import analyse
-
-    case, grains = session.case, packed_grains(session)
-    invasion = None
-    if record is not None and isinstance(case, InvasionCase) and case.by_classes:
-        return _analysed_classes(session, case, grains, record)
-    if record is not None and isinstance(case, InvasionCase):
-        invasion = invaded(session, case, grains, record)
-    damaged = None if invasion is None else invasion.damaged
-    first = with_default_laws(grains, damaged, periodic=case.periodic, options=case.analysis)
-    after: Returned | None = None
-    if damaged is not None and isinstance(case, InvasionCase) and returns:
-        state = returned(session, case, grains)
-        options = case.analysis.changed(damage_law=first.damage_law_used)
-        again = analyse(grains, state, periodic=case.periodic, options=options)
-        after = compared(damaged, state, again)
-    results = Results(
-        path=session.path,
-        grains=grains,
-        invasion=invasion,
-        analysis=first,
-        sizes=tuple(placed_sizes(case, grains, damaged, record["supplied"] if record else 0)),
-        cleaned=after,
+def _analysed(session: Session, records: Records) -> Results:
+    """The specimen before, after the invasion if any, and after its clean-up if any."""
+    case, grains, record = (
+        session.case,
+        packed_grains(session.path, session.case),
+        records["invade"],
     )
-    finer = record is not None and finer_file(record["steps"]) in record["files"]
-    return with_finer(results, record["supplied"]) if record and finer else results
-
-
-def _analysed_classes(
-    session: Session, case: InvasionCase, grains: Snapshot, record: dict[str, Any]
-) -> Results:
-    """The specimen after the fast model."""
-    from fdnet.network.permeability import analyse
-
+    laws = partial(with_default_laws, periodic=case.periodic, options=case.analysis)
+    results = partial(Results, path=session.path, grains=grains)
+    if record is None or not isinstance(case, InvasionCase):
+        sizes = tuple(placed_sizes(case, grains, None, 0))
+        return results(invasion=None, analysis=laws(grains, None), sizes=sizes)
     folder = session.path / "invade"
-    check_files(folder, record, START_OVER)
-    done, model, kept = finished_classes(case, invasion_scales(case), grains, folder)
-    clean = analyse(grains, periodic=case.periodic, options=case.analysis)
-    return Results(
-        path=session.path,
-        grains=grains,
-        invasion=done,
-        analysis=analysed_classes(model, kept, clean, done.damaged),
-        sizes=tuple(placed_sizes(case, grains, None, 0)),
-        numbers=class_summary(case, model, kept),
-    )
+    if case.by_classes:
+        check_files(folder, record, START_OVER)
+        done, model, kept = finished_classes(case, invasion_scales(case), grains, folder)
+        return results(
+            invasion=done,
+            analysis=analysed_classes(model, kept, laws(grains, None), done.damaged),
+            sizes=tuple(placed_sizes(case, grains, None, 0)),
+            numbers=class_summary(case, model, kept),
+        )
+    done, after = invaded(session, case, grains, record), None
+    analysis = laws(grains, done.damaged)
+    if records.get("clean_up"):
+        from fdnet.network.permeability import analyse
+
+        state = returned(session, case, grains)
+        options = case.analysis.changed(damage_law=analysis.damage_law_used)
+        again = analyse(grains, state, periodic=case.periodic, options=options)
+        after = compared(done.damaged, state, again)
+    sizes = tuple(placed_sizes(case, grains, done.damaged, record["supplied"]))
+    found = results(invasion=done, analysis=analysis, sizes=sizes, cleaned=after)
+    finer = finer_file(record["steps"]) in record["files"]
+    return with_finer(found, record["supplied"]) if finer else found
 
 
 def with_finer(results: Results, supplied: int) -> Results:
@@ -391,7 +360,7 @@ def with_finer(results: Results, supplied: int) -> Results:
     one, grains = results.invasion, results.grains
     assert one is not None
     case, last = one.case, one.history[-1]
-    model = class_model(case, one.scales, grains)
+    model = class_model(case, one.scales, grains, network=results.analysis.network)
     kept = read_classes(results.path / "invade" / finer_file(last.step), one.updates[-1])
     counts = model.counted(kept.by_class[-1])
     fines = spheres_at_the_end(case, model, kept, counts)
@@ -406,11 +375,7 @@ def with_finer(results: Results, supplied: int) -> Results:
 
 
 def with_default_laws(
-    grains: Snapshot,
-    damaged: Snapshot | None,
-    *,
-    periodic: Directions,
-    options: AnalysisChoices,
+    grains: Snapshot, damaged: Snapshot | None, *, periodic: Directions, options: AnalysisChoices
 ) -> "Analysis":
     """The analysis; by laws that are off by factors, a warning has the numbers by the default."""
     from fdnet.network.permeability import compare
@@ -423,43 +388,11 @@ def with_default_laws(
     return replace(first, warnings=(*said, *first.warnings))
 
 
-def _summary(
-    session: Session,
-    results: Results,
-    pack: dict[str, Any],
-    invasion: dict[str, Any] | None,
-    cleaned: dict[str, Any] | None,
-) -> dict[str, Any]:
-    """The mapping of summary.json."""
-    case, history = session.case, results.history_rows
-    summary = summarise(
-        case,
-        results.analysis,
-        pack=pack,
-        invasion=invasion,
-        sizes={one.name: size_numbers(one) for one in results.sizes},
-        last=results.invasion.history[-1] if results.invasion else None,
-        physical_time_s=history[-1]["physical_time_s"] if history else None,
-        seconds=stage_seconds(pack, invasion, session.seconds, cleaned=cleaned),
-        warnings=[
-            *(one.sentence for one in every_finding(case, session.scales)),
-            *record_warnings(case, pack, invasion),
-            *(cleaned["warnings"] if cleaned else []),
-            *file_warnings(session),
-        ],
-    )
-    summary |= results.numbers
-    for one in results.added:
-        summary |= one.summary
-    return with_answer(summary, case, results.analysis, results.shown)
-
-
 def _write_page(
     session: Session,
     results: Results,
     summary: dict[str, Any],
     figures: list[tuple[Path, str]],
-    programs: dict[str, str],
 ) -> None:
     case, command = session.case, session.options.command
     parts = html.ReportParts(
@@ -467,7 +400,7 @@ def _write_page(
         case_words=list(case_words(case, session.scales)),
         case_text=case.toml(),
         scales=scale_rows(case, session.scales),
-        versions=programs,
+        versions=session.versions(),
         commands=[command] if command else [],
         tables=[one.page for one in results.added if one.page is not None],
         stokes=report_section(session.path, case, summary),

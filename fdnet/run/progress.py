@@ -27,20 +27,13 @@ part of it that is left; and steps that are expected beyond the forecast, over t
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Forecast:
-    """What is known of a stage before it, in steps of its first length.
+    """What is known of a stage before it, in steps of its first length."""
 
-    Attributes:
-        expected: at which it is expected to end.
-        plug: without a crossing of the face, after which it ends; 0 without such a rule.
-        cap: at which it ends at the latest; None without such a step.
-        allowed: crossings a step that the rule lets pass.
-        chunk: steps of a chunk, where later chunks may take more; 0 where all steps are alike.
-    """
-
-    expected: int
-    plug: int = 0
-    cap: int | None = None
-    allowed: float = 0.0
+    expected: int  # at which it is expected to end
+    plug: int = 0  # without a crossing of the face, after which it ends; 0 without such a rule
+    cap: int | None = None  # at which it ends at the latest; None without such a step
+    allowed: float = 0.0  # crossings a step that the rule lets pass
+    # steps of a chunk, where later chunks may take more; 0 where all steps are alike
     chunk: int = 0
 
     def end(self, seen: Sequence[tuple[int, int]]) -> int:
@@ -83,8 +76,6 @@ _NOTES = {
     "cleaned": "chunk {}",
 }
 """What the lines of a deck say, by their first word; a line without an entry says nothing."""
-_MOST_STEPS = 10**9
-"""Number of steps from which they are shown with three digits."""
 
 
 class Progress:
@@ -202,10 +193,10 @@ class Progress:
 
 
 def _short(number: str) -> str:
-    """A number with three digits, unless it is a count of usual size."""
+    """A whole number below 10^9 as it is, others with three digits; a word stays."""
+    if number.isdecimal() and len(number) < 10:
+        return number
     try:
-        return (
-            number if number.isdecimal() and int(number) < _MOST_STEPS else f"{float(number):.3g}"
-        )
+        return f"{float(number):.3g}"
     except ValueError:
         return number

@@ -8,7 +8,7 @@ import shlex
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
@@ -52,14 +52,9 @@ _PACKAGES = ["fdnet", "numpy", "scipy", "pandas", "jinja2", "pyvista", "matplotl
 _PACKAGES += ["overlap", "pymetis"]
 
 
-def pack_record(
-    case: Case, pack: Pack, folder: Path, *, assumed: float, seconds: float
-) -> dict[str, Any]:
+def pack_record(pack: Pack, folder: Path, *, assumed: float) -> dict[str, Any]:
     """pack/stage.json: how the pack in `folder` was reached."""
     return {
-        "format": RECORD_FORMAT,
-        "digest": case.digest("pack"),
-        "seconds": seconds,
         "porosity_assumed": assumed,
         "porosity": pack.porosity,
         "porosity_error": pack.porosity_error,
@@ -77,16 +72,11 @@ def pack_record(
     }
 
 
-def invade_record(
-    case: InvasionCase, result: Invasion, folder: Path, *, seconds: float
-) -> dict[str, Any]:
+def invade_record(case: InvasionCase, result: Invasion, folder: Path) -> dict[str, Any]:
     """invade/stage.json: how the invasion in `folder` ended."""
     dumps = [f"post/invade_{row.step}.dump" for row in result.history]
     finer = finer_file(result.history[-1].step)
     return {
-        "format": RECORD_FORMAT,
-        "digest": case.digest("invade"),
-        "seconds": seconds,
         "stop_reason": result.stop_reason,
         "max_overlap": result.overlap.fraction,
         "max_overlap_step": result.overlap.step,
@@ -145,15 +135,14 @@ def run_record(run: Execution) -> dict[str, Any]:
 
 
 def record_warnings(
-    case: Case, pack: dict[str, Any], invasion: dict[str, Any] | None
+    case: Case, pack: Mapping[str, Any], invasion: Mapping[str, Any]
 ) -> Iterator[str]:
     """Doubts about the DEM runs, from the records of their stages.
 
     They are another LIGGGHTS than fdnet was measured with, large overlaps, and how the runs ended.
     """
     version = pack["runs"][0]["version"]
-    if invasion is not None:
-        yield from invasion["warnings"]
+    yield from invasion.get("warnings", [])
     if version != KNOWN_VERSION:
         yield Doubt(
             "another-liggghts",
@@ -179,7 +168,7 @@ def record_warnings(
             f"{pack['porosity_assumed']:.3f} (plain sum of grains.count), the pack has "
             f"{pack['porosity']:.3f}: give grains.porosity instead of the count",
         )
-    if invasion is None:
+    if not invasion:
         return
     step = invasion.get("max_overlap_step", invasion["steps"])
     deepest = Deepest(step=step, fraction=invasion["max_overlap"])
@@ -198,52 +187,27 @@ def record_warnings(
         )
 
 
-def stage_seconds(
-    pack: dict[str, Any],
-    invasion: dict[str, Any] | None,
-    own: dict[str, float],
-    *,
-    cleaned: dict[str, Any] | None = None,
-) -> dict[str, float]:
-    """Seconds of each stage, and those of them that LIGGGHTS took.
-
-    They are those of the session that finished the stage; `own` are those of this session.
-    """
-    runs = [run for one in (pack, invasion, cleaned) if one for run in one["runs"]]
-    waited = sum(run.get("waited", 0.0) for run in runs)
-    return {
-        "pack": pack["seconds"],
-        "invade": invasion["seconds"] if invasion else 0.0,
-        **({"clean_up": cleaned["seconds"]} if cleaned else {}),
-        "analyse": own.get("analyse", 0.0),
-        "report": own.get("report", 0.0),
-        "liggghts": sum(run["seconds"] for run in runs)
-        + sum(row["liggghts_s"] for row in pack["attempts"][:-1])
-        - waited,
-        **({"updates": waited} if waited else {}),
-    }
-
-
 def stage_costs(
-    stages: Sequence[dict[str, Any] | None], own: Mapping[str, float]
+    records: Mapping[str, dict[str, Any] | None], session: "Session"
 ) -> dict[str, dict[str, Any]]:
-    """Keys of the summary: processor seconds and peak memory of LIGGGHTS and of fdnet itself.
+    """Keys of the summary: seconds, processor seconds and peak memory.
 
-    `stages` are the records of those that run LIGGGHTS, each with the seconds of the session that
-    finished it; `own` are fdnet's processor seconds in this session. The memory of fdnet is that
-    of this process so far, of LIGGGHTS that of its largest run.
+    They are those of the session that finished a stage. The memory of fdnet is that of this
+    process so far, of LIGGGHTS that of its largest run.
     """
-    done = [record for record in stages if record]
-    runs = [run for record in done for run in record["runs"]]
-    earlier = [row for record in done for row in record.get("attempts", [])[:-1]]
+    done = {stage: record for stage, record in records.items() if record}
+    runs = [run for record in done.values() for run in record["runs"]]
+    waited = sum(run.get("waited", 0.0) for run in runs)
+    failed = sum(row["liggghts_s"] for row in done["pack"]["attempts"][:-1])
     peaks = [run.get("peak_memory_bytes") for run in runs]
     return {
-        "cpu_seconds": {
-            "liggghts": sum(run.get("cpu_seconds", 0.0) for run in runs)
-            + sum(row.get("liggghts_cpu_s", 0.0) for row in earlier),
-            "python": sum(record.get("cpu_seconds", 0.0) for record in done)
-            + sum(own.get(stage, 0.0) for stage in ("analyse", "report")),
+        "seconds": {
+            **{stage: (one or {}).get("seconds", 0.0) for stage, one in records.items()},
+            **{stage: session.seconds.get(stage, 0.0) for stage in ("analyse", "report")},
+            "liggghts": sum(run["seconds"] for run in runs) + failed - waited,
+            **({"updates": waited} if waited else {}),
         },
+        "cpu_seconds": processor_seconds(done.values(), session.cpu_seconds),
         "peak_memory_bytes": {
             "liggghts": None if None in peaks else max(peaks, default=0),
             "python": peak_resident_bytes(),
@@ -251,37 +215,32 @@ def stage_costs(
     }
 
 
-def versions(pack: dict[str, Any] | None) -> dict[str, str]:
-    """Versions of everything that shaped the run."""
-    packages = {}
-    for name in _PACKAGES:
-        try:
-            packages[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            packages[name] = "not installed as a package"
-    liggghts = {"liggghts": pack["runs"][0]["version"]} if pack else {}
-    python, system = sys.version.split()[0], platform.platform()
-    return {**packages, "python": python, **liggghts, "system": system}
+def processor_seconds(
+    records: Iterable[dict[str, Any] | None], own: Mapping[str, float]
+) -> dict[str, float]:
+    """Of LIGGGHTS and of fdnet in stages with these records, and in those of this session."""
+    done = [record for record in records if record]
+    runs = [run for record in done for run in record["runs"]]
+    earlier = [row for record in done for row in record.get("attempts", [])[:-1]]
+    return {
+        "liggghts": sum(run.get("cpu_seconds", 0.0) for run in runs)
+        + sum(row.get("liggghts_cpu_s", 0.0) for row in earlier),
+        "python": sum(record.get("cpu_seconds", 0.0) for record in done)
+        + sum(own.get(stage, 0.0) for stage in ("analyse", "report")),
+    }
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FinishedInvasion:
-    """A finished invasion.
+    """A finished invasion."""
 
-    Attributes:
-        case: what was run.
-        scales: of the case.
-        history: one row a checkpoint.
-        damaged: grains and all remaining fines at the end.
-        updates: the record of a coupled invasion, one row an update; empty of others.
-        rows: of history.csv, where the fast model made it; empty of others.
-    """
-
-    case: InvasionCase
-    scales: InvasionScales
-    history: tuple[Checkpoint, ...]
-    damaged: Snapshot
+    case: InvasionCase  # what was run
+    scales: InvasionScales  # of the case
+    history: tuple[Checkpoint, ...]  # one row a checkpoint
+    damaged: Snapshot  # grains and all remaining fines at the end
+    # the record of a coupled invasion, one row an update; empty of others
     updates: tuple[Mapping[str, float], ...] = ()
+    # of history.csv, where the fast model made it; empty of others
     rows: tuple[dict[str, float], ...] = ()
 
 
@@ -291,22 +250,7 @@ class FinishedInvasion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
-    """How to run a case, as opposed to what it is.
-
-    Attributes:
-        out: run folder.
-        ranks: MPI ranks of LIGGGHTS.
-        resume: continue an unfinished run.
-        force: replace what is there.
-        stages: stages to run, of "pack", "invade", "analyse" and "report".
-        liggghts: path of the binary; None: looked for.
-        launcher: template that starts several ranks, as "srun -n {ranks}"; None: mpirun.
-        pack_from: run folder whose finished pack is taken; None: the pack is made.
-        timeout: s, after which LIGGGHTS is stopped in each stage; None: never.
-        show_progress: whether to write progress to standard error.
-        command: command line that started the run, for its records.
-        answered: takes the summary when the analysis is done, before the pictures are drawn.
-    """
+    """How to run a case, as opposed to what it is: the options of `fdnet run`."""
 
     out: Path
     ranks: int = 1
@@ -314,11 +258,14 @@ class RunOptions:
     force: bool = False
     stages: tuple[str, ...] = STAGES
     liggghts: str | None = None
+    # template that starts several ranks, as "srun -n {ranks}"; None: mpirun
     launcher: str | None = None
+    # run folder whose finished pack is taken; None: the pack is made
     pack_from: Path | None = None
-    timeout: float | None = None
+    timeout: float | None = None  # s, after which LIGGGHTS is stopped in each stage; None: never
     show_progress: bool = True
-    command: str = ""
+    command: str = ""  # command line that started the run, for its records
+    # takes the summary when the analysis is done, before the pictures are drawn
     answered: Callable[[Mapping[str, Any]], None] = lambda summary: None
 
     def __post_init__(self) -> None:
@@ -347,22 +294,15 @@ def most_ranks() -> int:
 
 @dataclass(slots=True)
 class Session:
-    """A run while it goes on.
+    """A run while it goes on."""
 
-    Attributes:
-        case: what is run.
-        scales: of the case.
-        folder: where it is run; this process holds its lock.
-        options: how it is run.
-        seconds: s, that each stage took in this session.
-        cpu_seconds: s of processors, that this process spent on each of them.
-    """
-
-    case: Case
-    scales: Scales
-    folder: RunFolder
-    options: RunOptions
+    case: Case  # what is run
+    scales: Scales  # of the case
+    folder: RunFolder  # where it is run; this process holds its lock
+    options: RunOptions  # how it is run
+    # s, that each stage took in this session
     seconds: dict[str, float] = field(default_factory=dict)
+    # s of processors, that this process spent on each of them
     cpu_seconds: dict[str, float] = field(default_factory=dict)
     _binary: Binary | None = None
 
@@ -374,6 +314,18 @@ class Session:
     def wants(self, stage: str) -> bool:
         """Whether the stage was asked for and belongs to the case."""
         return stage in self.options.stages and stage in self.case.stages
+
+    def versions(self) -> dict[str, str]:
+        """Versions of everything that shaped the run."""
+        packages = {}
+        for name in _PACKAGES:
+            try:
+                packages[name] = metadata.version(name)
+            except metadata.PackageNotFoundError:
+                packages[name] = "not installed as a package"
+        pack, python = self.folder.record("pack") or {}, sys.version.split()[0]
+        liggghts, system = pack["runs"][0]["version"], platform.platform()
+        return {**packages, "python": python, "liggghts": liggghts, "system": system}
 
     def launch(self, progress: Progress) -> Launch:
         """How a stage that begins now starts LIGGGHTS, within its time limit."""
@@ -395,6 +347,12 @@ class Session:
         self.seconds[stage] = self.seconds.get(stage, 0.0) + time.monotonic() - start
         used = time.process_time() - cpu
         self.cpu_seconds[stage] = self.cpu_seconds.get(stage, 0.0) + used
+
+    def finish(self, stage: str, record: dict[str, Any]) -> None:
+        """Mark a stage as done, with the time that it took in this session."""
+        own = {"format": RECORD_FORMAT, "digest": self.case.digest(stage)}
+        own |= {"seconds": self.seconds[stage], "cpu_seconds": self.cpu_seconds[stage]}
+        self.folder.finish(stage, own | record)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -430,11 +388,11 @@ def take_pack(session: Session, source: Path) -> None:
         )
     nothing = ("liggghts_s", "liggghts_cpu_s")
     own = {
-        "seconds": session.seconds["pack"],
         "cpu_seconds": session.cpu_seconds["pack"],
+        "seconds": session.seconds["pack"],
         "taken_from": str(source),
         "made_in_seconds": record["seconds"],
         "runs": [row | {"seconds": 0.0, "cpu_seconds": 0.0} for row in record["runs"]],
         "attempts": [row | dict.fromkeys(nothing, 0.0) for row in record["attempts"]],
     }
-    session.folder.finish("pack", record | own)
+    session.finish("pack", record | own)

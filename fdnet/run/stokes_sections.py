@@ -1,15 +1,14 @@
 """Sections of a finished run by resolved Stokes flow, and what the network gives for them.
 
 Resolved flow needs no law of throats. It takes minutes where the network takes seconds, so it is
-computed for the sections that a user names, mostly the first. Each is solved on two grids, which
-the run folder keeps (docs/how-to/check_the_face.md).
+computed for the sections that a user names, mostly the first, each on two grids
+(docs/how-to/check_the_face.md).
 """
 
 import html
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
-from math import ceil
+from dataclasses import dataclass
+from math import ceil, isclose
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +17,10 @@ from scipy import fft
 
 from fdnet.case.case import Case
 from fdnet.errors import CaseError
-from fdnet.files import write_text
 from fdnet.network.states import cut_out
 from fdnet.network.stokes import StokesFlow, Walled, divide, estimate, solve_slab
 from fdnet.report.html import STOKES, put_section, stokes_html
-from fdnet.report.tables import JsonObject, Positive, read_table, write_rows
+from fdnet.report.tables import JsonObject, read_table, write_rows
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import locked
 from fdnet.run.records import cores
@@ -39,30 +37,20 @@ BYTES = 200
 """Memory for each cell."""
 SECONDS = {"initial": 1.2e-5, "damaged": 2.5e-5}
 """For each cell, on one core."""
-KEPT_IN, GRIDS, RESOLVED = "stokes", "grids.json", "sections.csv"
-"""Folder in the run folder, the file of the solved grids, the table of the sections."""
+KEPT_IN, RESOLVED = "stokes", "sections.csv"
+"""Folder in the run folder, and the table of the sections in it."""
 Follow = Callable[[str], None]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ResolvedSlab:
-    """Spheres between two planes.
+    """Spheres between two planes."""
 
-    Attributes:
-        spheres: those that reach into it.
-        span: lower and upper plane, x in m.
-        closed: which sides are walls.
-        state: "initial" or "damaged".
-        digest: of the file of the spheres.
-        across: cells across the mean radius of a fine, on the finer of two grids.
-    """
-
-    spheres: Snapshot
-    span: tuple[float, float]
-    closed: Walled
-    state: str
-    digest: str
-    across: float
+    spheres: Snapshot  # those that reach into it
+    span: tuple[float, float]  # lower and upper plane, x in m
+    closed: Walled  # which sides are walls
+    state: str  # "initial" or "damaged"
+    across: float  # cells across the mean radius of a fine, on the finer of two grids
 
     __repr__ = one_line
 
@@ -98,81 +86,23 @@ class ResolvedSlab:
         return int(np.prod(divide(self.edges, cells)))
 
 
-class KeptGrid(JsonObject):
-    """A solved grid in the file `GRIDS`: what was solved, and the fields of `StokesFlow`."""
-
-    state: str
-    x_lo_m: float
-    x_hi_m: float
-    cells: int
-    spheres: str
-    k: Positive
-    iterations: int
-    residual: float
-    seconds: float
-    unknowns: int
-
-
-def read_grids(path: Path) -> list[KeptGrid]:
-    """The solved grids of a run, none without the file. Raises CaseError for another content."""
-    if not path.is_file():
-        return []
-    try:
-        rows = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(rows, list):
-            raise ValueError(f"{type(rows).__name__}, expected a list")
-        return [KeptGrid.model_validate(row) for row in rows]
-    except (OSError, ValueError) as error:
-        raise CaseError(
-            f"{path}: cannot be read as solved grids ({error}); remove it, and its grids are "
-            "solved again"
-        ) from error
-
-
-def flow_through(slab: ResolvedSlab, cells: int, path: Path, follow: Follow) -> StokesFlow:
-    """The flow on one grid, out of the file at `path` or solved and added to it."""
-    key = {
-        "state": slab.state,
-        "x_lo_m": slab.span[0],
-        "x_hi_m": slab.span[1],
-        "cells": cells,
-        "spheres": slab.digest,
-    }
-    kept, names = read_grids(path), [one.name for one in fields(StokesFlow)]
-    for one in kept:
-        row = one.model_dump()
-        if key.items() <= row.items():
-            return StokesFlow(**{name: row[name] for name in names})
+def flow_through(slab: ResolvedSlab, cells: int, follow: Follow) -> StokesFlow:
+    """The flow on one grid."""
     size = slab.size(cells)
     seconds = max(1.0, SECONDS[slab.state] * size / cores() ** 0.5)
     took = f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
     memory = BYTES * size / 2**30
     follow(f"{slab.words}: {size / 1e6:.1f} million cells, about {took} and {memory:.1f} GiB")
     with fft.set_workers(cores()):
-        flow = solve_slab(
+        return solve_slab(
             slab.spheres, slab.span, cells=cells, tolerance=K_TOLERANCE, closed=slab.closed
         )
-    rows = [one.model_dump() for one in kept]
-    rows.append(key | {name: getattr(flow, name) for name in names})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_text(path, json.dumps(rows, indent=1) + "\n")
-    return flow
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StokesSection:
-    """A section, cut out, by resolved flow.
+class StokesSection(JsonObject):
+    """A section, cut out, by resolved flow: lengths in m, permeabilities in m2.
 
-    Attributes:
-        x_lo_m: where it begins, m.
-        x_hi_m: where it ends, m.
-        k_initial_m2: without fines, m2.
-        k_initial_error: share of it.
-        k_damaged_m2: with fines, m2.
-        k_damaged_error: share of it.
-        k_reduction: 1 - k_damaged_m2 / k_initial_m2.
-        cell_initial_m: edge of a cell of the finer grid without fines, m.
-        cell_damaged_m: edge of a cell of the finer grid with fines, m.
+    An error is a share of its permeability, a cell the edge of one of the finer grid.
     """
 
     x_lo_m: float
@@ -185,6 +115,10 @@ class StokesSection:
     cell_initial_m: float
     cell_damaged_m: float
 
+    def is_at(self, place: Mapping[str, float]) -> bool:
+        """Whether it has these numbers."""
+        return all(isclose(getattr(self, key), one, rel_tol=1e-6) for key, one in place.items())
+
 
 def stokes_sections(
     folder: Path,
@@ -195,8 +129,8 @@ def stokes_sections(
 ) -> list[dict[str, Any]]:
     """Sections of a finished run by resolved Stokes flow and by the network, each cut out.
 
-    They are written to the folder `KEPT_IN` of the run and to its report. Every solved grid is
-    kept there, so a cut computation goes on behind the last of them.
+    They are written to the folder `KEPT_IN` of the run and to its report. A section that stands
+    there, on the same grids, is not solved again.
 
     Args:
         folder: of the run.
@@ -221,31 +155,24 @@ def stokes_sections(
     with locked(open_run(folder).path):
         run = open_run(folder)
         slabs = _slabs(run, numbers, across)
-        grids, table = run.path / KEPT_IN / GRIDS, run.path / KEPT_IN / RESOLVED
-        read_sections(table)  # refuses a broken table before hours of solving
+        table = run.path / KEPT_IN / RESOLVED
         for before, *after in slabs:
-            row: dict[str, float] = {}
-            for slab in (before, *after) if after else (before, before):
-                name = "damaged" if row else "initial"
-                k = estimate(
-                    *(flow_through(slab, cells, grids, follow) for cells in slab.cells),
-                    with_fines=len(slab.spheres.fines()) > 0,
-                )
-                row |= {f"k_{name}_m2": k.k, f"k_{name}_error": k.error}
+            pair = {"initial": before, "damaged": after[0] if after else before}
+            row = {"x_lo_m": before.span[0], "x_hi_m": before.span[1]}
+            known = [one for one in read_sections(table) if not one.is_at(row)]
+            for name, slab in pair.items():
                 row[f"cell_{name}_m"] = float(slab.edges.max()) / slab.cells[1]
-            one = StokesSection(
-                x_lo_m=before.span[0],
-                x_hi_m=before.span[1],
-                k_reduction=1.0 - row["k_damaged_m2"] / row["k_initial_m2"],
-                **row,
-            )
-            others = [
-                other
-                for other in read_sections(table)
-                if (other.x_lo_m, other.x_hi_m) != before.span
-            ]
+            if any(one.is_at(row) for one in read_sections(table)):
+                continue
+            for name, slab in pair.items():
+                if name == "initial" or after:
+                    flows = [flow_through(slab, cells, follow) for cells in slab.cells]
+                    k = estimate(*flows, with_fines=len(slab.spheres.fines()) > 0)
+                row |= {f"k_{name}_m2": k.k, f"k_{name}_error": k.error}
+            row["k_reduction"] = 1.0 - row["k_damaged_m2"] / row["k_initial_m2"]
+            every = sorted([*known, StokesSection(**row)], key=lambda one: one.x_lo_m)
             table.parent.mkdir(exist_ok=True)
-            write_rows(table, sorted(map(asdict, [*others, one]), key=lambda row: row["x_lo_m"]))
+            write_rows(table, [vars(one) for one in every])
         rows = with_network(read_sections(table), run.summary)
         if (run.path / "report.html").is_file():
             put_section(run.path / "report.html", STOKES, stokes_html(rows))
@@ -254,17 +181,17 @@ def stokes_sections(
 
 def _slabs(run: FinishedRun, numbers: Sequence[int], across: float) -> list[list[ResolvedSlab]]:
     """Each section before and, where fines reach into it or grains moved, after the invasion."""
+    if _slips(run.case):
+        raise CaseError(
+            "analysis.walls: 'slip', but resolved flow knows only side walls that hold the "
+            "fluid; analyse the run with analysis.walls = 'no-slip' first"
+        )
     spheres = {state: run.spheres(state) for state in ("initial", "damaged")}
     sections, (_, y, z), pairs = run.summary["sections"], run.case.periodic, []
     for number in numbers:
         if not 1 <= number <= len(sections):
             raise CaseError(
                 f"--section: {number}, expected 1 to {len(sections)}, the sections of the run"
-            )
-        if _slips(run.case):
-            raise CaseError(
-                "analysis.walls: 'slip', but resolved flow knows only side walls that hold the "
-                "fluid; analyse the run with analysis.walls = 'no-slip' first"
             )
         span = (sections[number - 1]["x_lo_m"], sections[number - 1]["x_hi_m"])
         pair = [
@@ -273,7 +200,6 @@ def _slabs(run: FinishedRun, numbers: Sequence[int], across: float) -> list[list
                 span=span,
                 closed=(False, not y, not z),
                 state=state,
-                digest=str(run.manifest.get("files", {}).get(f"spheres_{state}.csv", "")),
                 across=across,
             )
             for state, one in spheres.items()
@@ -324,7 +250,7 @@ def with_network(
             if one.x_lo_m == section["x_lo_m"] and one.x_hi_m == section["x_hi_m"]:
                 names = ("k_initial_m2", "k_damaged_m2", "k_reduction")
                 network = {f"network_{name}": section[name] for name in names}
-                rows.append({"section": section["section"]} | asdict(one) | network | law)
+                rows.append({"section": section["section"]} | vars(one) | network | law)
     return rows
 
 
@@ -335,17 +261,11 @@ def read_sections(path: Path) -> list[StokesSection]:
     """
     if not path.is_file():
         return []
-    names = [one.name for one in fields(StokesSection)]
     try:
-        table = read_table(path, names)[names]
-        if not np.isfinite(table.to_numpy(float)).all():
-            raise CaseError("a number is not finite")
+        rows = read_table(path, list(StokesSection.model_fields)).to_dict("records")
+        return [StokesSection.model_validate(row) for row in rows]
     except (CaseError, ValueError) as error:
-        why = str(error).partition("; ")[0].removeprefix(f"{path}: ")
         raise CaseError(
-            f"{path}: cannot be read ({why}), expected numbers below {', '.join(names)}; remove "
-            "it and call fdnet stokes again"
+            f"{path}: is no table of resolved sections, expected a number in each of its columns; "
+            "remove it and call fdnet stokes again"
         ) from error
-    return [
-        StokesSection(**dict(zip(names, row, strict=True))) for row in table.to_numpy().tolist()
-    ]

@@ -1,13 +1,18 @@
 """summary.json: the numbers of a run that a program reads."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fdnet.case.case import Case
-from fdnet.dem.checkpoint import Checkpoint
 from fdnet.errors import by_importance, explained
+from fdnet.names import LIGGGHTS_STAGES
 from fdnet.report.tables import section_rows
+from fdnet.run.answer import with_answer
+from fdnet.run.dem_stages import file_warnings
+from fdnet.run.outputs import Results, size_numbers
+from fdnet.run.records import Session, record_warnings, stage_costs
+from fdnet.scales.check import every_finding
 
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
@@ -17,32 +22,27 @@ SEEN = 5e-4
 
 
 def summarise(
-    case: Case,
-    analysis: "Analysis",
-    *,
-    pack: dict[str, Any],
-    invasion: dict[str, Any] | None,
-    last: Checkpoint | None,
-    physical_time_s: float | None,
-    sizes: dict[str, Any],
-    seconds: dict[str, float],
-    warnings: list[str],
+    session: Session, results: Results, records: Mapping[str, dict[str, Any] | None]
 ) -> dict[str, Any]:
-    """The mapping of summary.json.
-
-    `pack` and `invasion` are the records of their stages, `last` is the last checkpoint and
-    `physical_time_s` the time of the fluid then; those of the invasion are None without fines.
-    `sizes` are those of measured curves, {} without them.
-    """
+    """The mapping of summary.json; `records` are those of the stages of LIGGGHTS."""
+    case, analysis, history = session.case, results.analysis, results.history_rows
+    pack, invasion, cleaned = (records.get(stage) or {} for stage in LIGGGHTS_STAGES)
+    last = results.invasion.history[-1] if results.invasion else None
+    warnings = [
+        *(one.sentence for one in every_finding(case, session.scales)),
+        *record_warnings(case, pack, invasion),
+        *cleaned.get("warnings", []),
+        *file_warnings(session),
+        *analysis.warnings,
+    ]
+    sizes = {one.name: size_numbers(one) for one in results.sizes}
     network, occupancy = analysis.network, analysis.occupancy
     moved = {} if analysis.k_moved is None else {"k_moved_m2": analysis.k_moved}
-    stop = invasion["stop_reason"] if invasion else None
+    stop = invasion.get("stop_reason")
     left_out = [f"pack: {item}" for item in pack["left_out"]]
-    if invasion is None:
-        left_out.append("invade: the whole invasion (no fines in the case)")
-    else:
-        left_out += [f"invade: {item}" for item in invasion["left_out"]]
-    return {
+    none = ["the whole invasion (no fines in the case)"]
+    left_out += [f"invade: {item}" for item in invasion.get("left_out", none)]
+    summary = {
         "case": case.name,
         "seed": case.seed,
         "law": analysis.law,
@@ -58,7 +58,7 @@ def summarise(
         "damage_law_other": analysis.damage_law_other,
         "k_damaged_other_m2": analysis.k_damaged_other,
         **moved,
-        "supplied_count": invasion["supplied"] if invasion else 0,
+        "supplied_count": invasion.get("supplied", 0),
         "invaded_count": analysis.invaded_count,
         "passed_count": last.passed if last else 0,
         "upstream_count": last.upstream if last else 0,
@@ -68,7 +68,7 @@ def summarise(
         "cake_thickness_m": analysis.cake_thickness,
         "stop_reason": stop,
         "final": stop not in ("cap", "mud_cut_off", "unfinished") if invasion else None,
-        **({"share_done": invasion["share_done"]} if stop == "unfinished" and invasion else {}),
+        **({"share_done": invasion["share_done"]} if stop == "unfinished" else {}),
         "sections": section_rows(analysis),
         "pores": len(network.pore_radius),
         "throats": len(network.throat_radius),
@@ -79,21 +79,24 @@ def summarise(
         **({"sizes": sizes} if sizes else {}),
         "max_overlap_fraction": (invasion or pack)["max_overlap"],
         "grain_overlap_fraction": pack["max_overlap"],
-        "ranks": {"pack": pack["ranks"], "invade": invasion["ranks"] if invasion else None},
-        "dem_steps": pack["steps"] + (invasion["steps"] if invasion else 0),
-        "dem_dt_s": (invasion or pack)["dt_s"],
-        **(invasion or {}).get("springs", {}),
-        "physical_time_s": physical_time_s,
-        "seconds": seconds
-        | {f"analyse_{name}": value for name, value in analysis.seconds.items()},
+        "ranks": {"pack": pack["ranks"], "invade": invasion.get("ranks")},
+        "dem_steps": pack["steps"] + (invasion["steps"] if invasion.get("dt_s") else 0),
+        "dem_dt_s": (invasion or pack)["dt_s"] or None,
+        **invasion.get("springs", {}),
+        "physical_time_s": history[-1]["physical_time_s"] if history else None,
+        **stage_costs(records, session),
         "left_out": left_out,
-        "warnings": by_importance(explained(one) for one in [*warnings, *analysis.warnings]),
+        "warnings": by_importance(map(explained, warnings)),
+        **results.numbers,
     }
+    for one in results.added:
+        summary |= one.summary
+    return with_answer(summary, case, analysis, results.shown)
 
 
-def _updates(invasion: dict[str, Any] | None) -> dict[str, Any]:
+def _updates(invasion: Mapping[str, Any]) -> dict[str, Any]:
     """What a coupled invasion measured at its last update; nothing of one that is not coupled."""
-    updates = (invasion or {}).get("updates")
+    updates = invasion.get("updates")
     if updates is None:
         return {}
     last = updates["last"]

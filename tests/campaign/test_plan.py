@@ -52,11 +52,12 @@ def planned(path: Path) -> tuple[dict, dict]:
 def test_a_dry_run_says_the_time_and_writes_nothing(write, tmp_path, capsys):
     path = write(GRID)
     words = ["sweep", str(path), "--out", str(tmp_path / "out"), "--dry-run"]
-    assert main(words) == 0
+    assert main([*words, "--jobs", "3", "--slurm", "runtime=60"]) == 0
     said = capsys.readouterr().out.splitlines()
-    assert len(said) == 7
-    assert said[-1].startswith("12 runs: ")
-    assert said[-1].endswith("2 packs of grains serve several runs")
+    assert len(said) == 8
+    assert said[-2].startswith("12 runs: ")
+    assert said[-2].endswith("2 packs of grains serve several runs")
+    assert said[-1].endswith("out: 3 at a time, by Slurm with runtime=60")
     assert not (tmp_path / "out").exists()
     assert main(["check", str(path)]) == 2
     assert "is a sweep file and no case; fdnet sweep takes it" in capsys.readouterr().err

@@ -63,7 +63,7 @@ def start(run):
     session = Session(
         case=case, scales=scales_of(case), folder=held, options=RunOptions(out=folder)
     )
-    grains = packed_grains(session)
+    grains = packed_grains(session.path, session.case)
     damaged = invaded(session, case, grains, invasion_record(session, case)).damaged
     held.close()
     return Start(grains=grains, invaded=damaged, invasion=folder / "invade", digest="test")

@@ -140,6 +140,6 @@ def test_a_pack_that_does_not_rest_is_made_again_from_the_next_places_and_given_
     assert 0.6 * draw_radii(case, 72) == pytest.approx(radius)
     inner = np.abs(reach - middle) < 0.5 * middle
     assert np.all(np.abs(start[:, 4:7] - reach)[inner] <= radius.max() + 1e-12)
-    record = pack_record(case, pack, tmp_path, assumed=0.4, seconds=1.0)
-    warnings = record_warnings(case, record, None)
+    record = pack_record(pack, tmp_path, assumed=0.4)
+    warnings = record_warnings(case, record, {})
     assert any("1 packs did not come to rest" in one for one in warnings)

@@ -1,14 +1,13 @@
 """The external cake, and what fines do to throats: beds, columns, classes by width and ratio."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from fdnet.report.text import cake_words
-from fdnet.run.bridging import open_throats, width_rows, wilsons_band
+from fdnet.run.bridging import wilsons_band
 from fdnet.run.cake import cake_rows, cake_summary, measure_cake
 from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.packs import simple_cubic
@@ -94,35 +93,3 @@ def test_wilsons_band():
         (81, 263, (0.2553, 0.3662)),
     ]:
         assert wilsons_band(hits, trials) == pytest.approx(band, abs=5e-5), (hits, trials)
-
-
-def test_bridged_throats_are_counted_by_width_with_the_fines_in_them():
-    """Four widths between grains, one that they close, and one out to a mirror image."""
-    network = SimpleNamespace(
-        throat_radius=np.array([1.0, 2.0, 3.0, 4.0, 0.0, 9.0]),
-        throat_images=np.array([*[[0, 1, 2]] * 5, [0, 1, 3]]),
-        image_position=np.array([*[[0.5, 0.5, 0.5]] * 3, [0.5, -0.5, 0.5]]),
-        box=np.array([[0.0, 1.0]] * 3),
-        periodic=(False, False, True),
-    )
-    occupancy = SimpleNamespace(
-        throat_fine_radius=np.array([0.5, 0.0, 2.0, 0.0, 9.0, 1.0]),
-        throat_fines=np.array([1, 0, 2, 0, 3, 1]),
-        blocked=np.array([True, False, False, False, False, True]),
-    )
-    analysis = SimpleNamespace(
-        network=network,
-        occupancy=occupancy,
-        conductance_initial=np.ones(6),
-        conductance_damaged=np.array([0.0, 1.0, 0.5, 0.6, 1.0, 0.05]),
-    )
-    *rows, beside = width_rows(open_throats(analysis))
-    assert [row["throats"] for row in rows] == [1, 1, 1, 1]
-    assert [row["bridged"] for row in rows] == [1, 0, 1, 0]
-    assert [row["blocked"] for row in (*rows, beside)] == [1, 0, 0, 0, 1]
-    assert [row["fine_over_throat"] for row in rows] == [0.5, None, pytest.approx(2 / 3), None]
-    assert rows[-1]["throat_to_m"] == 8.0
-    assert beside["throat_from_m"] is beside["fine_over_throat"] is None
-    assert (beside["throats"], beside["bridged"], beside["fines_median_m"]) == (1, 1, 2.0)
-    network.periodic = (False, True, True)  # then it is a grain beyond the period
-    assert sum(row["throats"] for row in width_rows(open_throats(analysis))) == 5

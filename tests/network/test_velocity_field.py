@@ -1,4 +1,4 @@
-"""The velocity field of a pack: exact flows, a second solver, balances, ends, streamlines."""
+"""The velocity field of a pack: exact flows, a second solver, balances, ends."""
 
 from dataclasses import replace
 from functools import cache
@@ -8,7 +8,7 @@ import pytest
 
 import fdnet
 from fdnet.errors import CaseError, NetworkError
-from fdnet.network.field.field import build_lattice, solved_field, streamlines
+from fdnet.network.field.field import build_lattice, solved_field
 from fdnet.network.stokes import solve_stokes
 from fdnet.spheres.snapshot import Snapshot
 from tests.network.packs import random_pack
@@ -143,28 +143,3 @@ def test_bad_points_packs_and_cells_are_refused():
     far = replace(pack(), position=pack().position + np.array([100.0, 0.0, 0.0]))
     with pytest.raises(NetworkError, match="no wall"):
         fdnet.velocity_field(far, periodic="yz")
-
-
-# ---- Streamlines.
-class Velocity:
-    """Stands for a field: the velocity of a formula of x, y, z."""
-
-    def __init__(self, formula):
-        self.formula = formula
-
-    def at(self, points):
-        return np.column_stack([np.broadcast_to(v, len(points)) for v in self.formula(*points.T)])
-
-
-def test_the_line_of_a_wave_is_the_integral_of_its_slope():
-    """dy/dx = cos x, so y = sin x; the midpoint rule errs like the square of the step."""
-    wave, off = Velocity(lambda x, y, z: (1.0, np.cos(x), 0.0)), []
-    for step in (0.1, 0.05):
-        (line,) = streamlines(wave, np.zeros((1, 3)), step=step, until=6.0)
-        assert line[-1, 0] >= 6.0
-        assert np.linalg.norm(np.diff(line, axis=0), axis=1) == pytest.approx(step, rel=1e-9)
-        off.append(np.abs(line[:, 1] - np.sin(line[:, 0])).max())
-    assert off[1] < 0.3 * off[0] < 1e-3
-    for step, until in [(0.0, 1.0), (0.1, -1.0)]:
-        with pytest.raises(CaseError, match="expected both to be positive"):
-            streamlines(wave, np.zeros((1, 3)), step=step, until=until)

@@ -1,4 +1,4 @@
-"""What a run answers: skin, damaged zone, rules of thumb, millidarcy and filtrate."""
+"""What a run answers: skin, damaged zone, rules of thumb and millidarcy."""
 
 import math
 from types import SimpleNamespace
@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from builders import naming
-from scipy.integrate import solve_ivp
 
 from fdnet.report.tables import in_millidarcy, millidarcy, percent
 from fdnet.report.text import answer_sentence, facts, in_place_words
@@ -15,7 +14,6 @@ from fdnet.run.answer import (
     FOLLOWED,
     FULL,
     QUICK,
-    BridgingSizes,
     Step,
     face_loss,
     flow_lost,
@@ -27,7 +25,6 @@ from fdnet.run.answer import (
     steps_of,
     zone_of,
 )
-from fdnet.run.cake import fit_filtration
 from fdnet.run.summary import above_intact
 
 
@@ -164,7 +161,7 @@ def test_a_zone_without_damage_without_end_and_without_flow():
 def sizes(**changed):
     fines = {"D50": 40e-6, "D85": 60e-6, "D90": 100e-6} | changed.pop("fines", {})
     given = {"throat_median": 100e-6, "throat_largest": 90e-6, "grain_d15": 270e-6}
-    return BridgingSizes(fines=fines, **(given | {"concentration": 0.05} | changed))
+    return {"fines": fines, **given, "concentration": 0.05, **changed}
 
 
 def test_each_rule_turns_at_its_published_limit():
@@ -178,16 +175,18 @@ def test_each_rule_turns_at_its_published_limit():
         ({"grain_d15": 541e-6}, ["bridges", "bridges", "bridges", "passes"]),
     ]:
         with naming(changed, says):
-            rules = rules_of(sizes(**changed), "bridges")
+            rules = rules_of("bridges", **sizes(**changed))
             assert [rule["says"] for rule in rules] == says
             expected = {"bridges": True, "passes": False, "between": None}
             assert [rule["agrees"] for rule in rules] == [expected[word] for word in says]
-            assert all(rule["agrees"] is None for rule in rules_of(sizes(**changed), "undecided"))
+            assert all(
+                rule["agrees"] is None for rule in rules_of("undecided", **sizes(**changed))
+            )
 
 
 def test_the_value_of_each_rule_is_its_ratio():
     """0.309 is (5/9)^2: the share finer grows with the square root of the size up to D90."""
-    values = [rule["value"] for rule in rules_of(sizes(), "bridges")]
+    values = [rule["value"] for rule in rules_of("bridges", **sizes())]
     assert values == pytest.approx([0.4, 100 / 90, 40 / 90 * (9 / 5) ** 2, 270 / 60])
 
 
@@ -301,65 +300,3 @@ def test_the_answer_is_a_sentence_to_act_on():
             text = answer_sentence(SUMMARY | changed)
             assert all(part in text for part in said), text
             assert not_said not in text
-
-
-# ---- Filtrate: a growing cake at constant pressure in closed form, and when nothing may be said.
-PRESSURE, VISCOSITY, PACK = 3.5e6, 0.05, 4e7
-"""Pa, Pa s, and the resistance of the pack in 1/m."""
-
-
-def grown(times):
-    """Filtrate per area of a Carman-Kozeny cake that grows on a pack, integrated step by step.
-
-    It holds the solids of a suspension of 5 % at a porosity of 0.4, of spheres of 20 um.
-    """
-    solids, porosity, diameter = 0.05, 0.4, 20e-6
-    k = porosity**3 * diameter**2 / (180 * (1 - porosity) ** 2)
-    growth = solids / (1 - porosity - solids)
-    result = solve_ivp(
-        lambda _, v: PRESSURE / (VISCOSITY * (PACK + growth * v / k)),
-        (0.0, times[-1]),
-        [0.0],
-        t_eval=times,
-        rtol=1e-10,
-        atol=1e-14,
-    )
-    return result.y[0], growth / k
-
-
-def test_a_growing_cake_makes_time_quadratic_in_the_filtrate():
-    times = np.linspace(0.0, 20.0, 60)
-    volume, alpha = grown(times)
-    fit = fit_filtration(times, volume)
-    assert fit.unsupported == ""
-    assert fit.a == pytest.approx(VISCOSITY * alpha / (2 * PRESSURE), rel=1e-5)
-    assert fit.b == pytest.approx(VISCOSITY * PACK / PRESSURE, rel=1e-4)
-    late, _ = grown(np.array([0.0, 450.0, 1800.0]))
-    assert fit.half_hour == pytest.approx(late[2], rel=1e-4)
-    assert fit.intercept == pytest.approx(2 * late[1] - late[2], rel=1e-2)
-    assert fit.intercept < 0
-    assert fit.spurt == 0.0
-
-
-def test_a_spurt_is_found_again():
-    """V = S + C sqrt(t) after the spurt S."""
-    times = np.linspace(1.0, 100.0, 80)
-    fit = fit_filtration(times, 2e-3 + 1e-3 * np.sqrt(times))
-    assert fit.spurt == pytest.approx(2e-3, rel=1e-6)
-    assert fit.half_hour == pytest.approx(2e-3 + 1e-3 * np.sqrt(1800.0), rel=1e-6)
-
-
-def test_a_history_that_is_no_growing_cake_supports_nothing():
-    times = np.linspace(0.0, 1.0, 40)
-    long = np.linspace(0.0, 20.0, 60)
-    for fit, why in (
-        (fit_filtration(times, 1e-3 * times), "the rate only fell to 1.00"),
-        (fit_filtration(times, 1e-3 * (1 - np.exp(-3 * times))), "t is not quadratic in V"),
-        (
-            fit_filtration(long, grown(long)[0], cake_share=0.28),
-            "the cake has 28 % of the resistance",
-        ),
-        (fit_filtration(times[:6], np.sqrt(times[:6])), "6 points"),
-    ):
-        assert why in fit.unsupported
-    assert fit_filtration(times[:3], times[:3]) is None

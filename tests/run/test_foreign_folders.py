@@ -19,8 +19,6 @@ CUBE = "x_m,y_m,z_m,radius_m\n" + "".join(
     f"{x + 0.5},{y + 0.5},{z + 0.5},0.5\n" for x in range(3) for y in range(3) for z in range(3)
 )
 
-LAWS = "law,damage_law,k_initial_m2\nlubrication,section-archie,1e-12\n"
-
 
 def content(folder: Path) -> dict[str, bytes]:
     """Every file below `folder` and what it holds."""
@@ -137,52 +135,9 @@ def test_decks_are_never_written_over_a_file(tmp_path, case, capsys):
         assert content(out) == before, name
 
 
-def test_the_table_of_laws_never_replaces_its_input(tmp_path, capsys):
-    spheres, other = tmp_path / "s.csv", tmp_path / "t.csv"
-    spheres.write_text(CUBE)
-    dots = tmp_path / "." / ".." / tmp_path.name / "s.csv"
-    for how in (None, other.symlink_to, other.hardlink_to, dots):
-        if callable(how):
-            how(spheres)
-        table = other if callable(how) else how or spheres
-        code, err = answer(capsys, "permeability", spheres, "--csv", table)
-        assert code == 2
-        assert "is the file of spheres itself" in err, how
-        assert spheres.read_text() == CUBE
-        other.unlink(missing_ok=True)
-
-
-def test_the_table_of_laws_replaces_a_table_of_laws_alone(tmp_path, capsys):
-    spheres = tmp_path / "s.csv"
-    spheres.write_text(CUBE)
-    for name, text, expected in (
-        ("old.csv", LAWS, 0),
-        ("empty.csv", "", 0),
-        ("letter.txt", "Dear Sir", 2),
-    ):
-        (tmp_path / name).write_text(text)
-        code, err = answer(capsys, "permeability", spheres, "--csv", tmp_path / name)
-        assert code == expected, err
-        if expected:
-            assert "is no table of laws" in err
-            assert (tmp_path / name).read_text() == text
-        else:
-            assert (tmp_path / name).read_text().startswith("law,damage_law,")
-    (tmp_path / "link.csv").symlink_to("kept.csv")
-    assert answer(capsys, "permeability", spheres, "--csv", tmp_path / "link.csv")[0] == 0
-    assert (tmp_path / "link.csv").is_symlink(), "it is written through a link"
-    assert (tmp_path / "kept.csv").read_text().startswith("law,")
-
-
-def test_the_table_of_laws_never_replaces_a_device_a_pipe_or_a_folder(tmp_path, capsys):
-    (tmp_path / "s.csv").write_text(CUBE)
+def test_a_device_a_pipe_or_a_folder_is_never_replaced(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "folder").mkdir()
-    (tmp_path / "null").symlink_to("/dev/null")
-    for name in ("pipe", "folder", "null"):
-        code, err = answer(capsys, "permeability", tmp_path / "s.csv", "--csv", tmp_path / name)
-        assert code == 2
-        assert "is no ordinary file" in err
     for name in ("pipe", "folder"):
         with pytest.raises(CaseError, match="is no ordinary file"):
             write_text(tmp_path / name, "x")
@@ -201,10 +156,10 @@ def test_the_home_folder_is_meant_by_a_tilde(tmp_path, case, capsys, monkeypatch
     given = ("~/case.toml", "--out=~/run", "--quiet", "--stages", ",".join(stages))
     assert answer(capsys, "run", *given)[0] == 0
     assert answer(capsys, "render", "~/case.toml", "--out=~/decks")[0] == 0
-    assert answer(capsys, "permeability", "~/s.csv", "--csv=~/laws.csv")[0] == 0
+    assert answer(capsys, "permeability", "~/s.csv")[0] == 0
     assert not list((tmp_path / "here").iterdir())
     names = {p.name for p in (tmp_path / "home").iterdir()}
-    assert {"run", "decks", "laws.csv"} <= names
+    assert {"run", "decks"} <= names
     assert fdnet.open_run("~/run").sections is not None
     assert len(fdnet.read_spheres("~/s.csv")) == 27
     assert fdnet.read_case("~/case.toml").name == "tiny"

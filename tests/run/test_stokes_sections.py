@@ -2,7 +2,6 @@
 
 import json
 import shutil
-from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -26,10 +25,11 @@ from fdnet.run.stokes_sections import (
 ROUGH, ROUGH_GRAIN = 1.0, 7.0
 """Cells across the radius of a fine and of a grain that keep the tests short."""
 
-HEAD = b",".join(one.name.encode() for one in fields(StokesSection)) + b"\n1,1\n"
+NAMES = list(StokesSection.model_fields)
+HEAD = ",".join(NAMES).encode() + b"\n1,1\n"
 """A table whose row has too few numbers."""
 
-NOT_FINITE = HEAD.replace(b"\n1,1", b"\n" + b",".join([b"nan"] * len(fields(StokesSection))))
+NOT_FINITE = HEAD.replace(b"\n1,1", b"\n" + b",".join([b"nan"] * len(NAMES)))
 
 
 def grid(cells: int, k: float) -> StokesFlow:
@@ -92,22 +92,22 @@ def test_no_slip_walls_are_those_of_resolved_flow_with_and_without_fines(tmp_pat
 
 
 @pytest.mark.liggghts
-def test_a_cut_computation_goes_on_behind_its_last_grid(resolved, tmp_path, monkeypatch):
-    folder = Path(shutil.copytree(resolved, tmp_path / "run"))
-    grids, table = folder / "stokes" / "grids.json", folder / "stokes" / "sections.csv"
-    before = read_sections(table)
-    table.unlink()
-    kept = json.loads(grids.read_text())
-    grids.write_text(json.dumps(kept[:-1]))
-    solved = []
-    solve = stokes_grids.solve_slab
+def test_a_section_is_solved_once(resolved, monkeypatch):
+    table, solved = resolved / "stokes" / "sections.csv", []
+    before, solve = read_sections(table), stokes_grids.solve_slab
     monkeypatch.setattr(
         stokes_grids,
         "solve_slab",
         lambda *given, **more: solved.append(1) or solve(*given, **more),
     )
-    stokes_sections(folder, (1,), across=ROUGH)
-    assert (len(kept), len(solved)) == (4, 1)
+    (row,) = stokes_sections(resolved, (1,), across=ROUGH)
+    assert (len(solved), read_sections(table)) == (0, before)
+    assert row["k_damaged_m2"] == before[0].k_damaged_m2
+    monkeypatch.setattr(stokes_grids, "ACROSS_A_GRAIN", 1.2 * ROUGH_GRAIN)
+    stokes_sections(resolved, (1,), across=ROUGH)
+    assert (len(solved), len(read_sections(table))) == (4, 1)
+    monkeypatch.setattr(stokes_grids, "ACROSS_A_GRAIN", ROUGH_GRAIN)
+    stokes_sections(resolved, (1,), across=ROUGH)
     assert read_sections(table) == before
 
 
@@ -139,20 +139,6 @@ def test_what_cannot_be_solved_is_refused_at_once(finished, capsys):
         assert main(["stokes", str(finished.path), *arguments]) == 2
         assert words in capsys.readouterr().err
         assert not (finished.path / "stokes").exists()
-
-
-@pytest.mark.liggghts
-def test_kept_grids_that_cannot_be_read_are_named(resolved, tmp_path):
-    folder = Path(shutil.copytree(resolved, tmp_path / "run"))
-    grids = folder / "stokes" / "grids.json"
-    rows = json.loads(grids.read_text())
-    texts = ["{", "[1, 2]", "{}", '[{"state": "initial"}]']
-    for k in (float("nan"), -1.0, None):
-        texts.append(json.dumps([rows[0], rows[1] | {"k": k}, *rows[2:]]))
-    for text in texts:
-        grids.write_text(text)
-        with naming(text), pytest.raises(CaseError, match=r"grids\.json: cannot be read"):
-            stokes_sections(folder, (1,), across=ROUGH)
 
 
 @pytest.mark.liggghts
