@@ -335,7 +335,7 @@ def back_flow(case: InvasionCase) -> BackFlow:
         raise CaseError(f"clean_up.drawdown_MPa: {given:g}: {error}") from error
     chunk = scales.checkpoint_steps * scales.time_step * scales.force_factor
     passage = case.size_m[0] / scales.drive_velocity * scales.force_factor
-    longest = choices.duration_s or choices.cap_s or MOST_PASSAGES * passage
+    longest = choices.duration_s or MOST_PASSAGES * passage
     chunks = longest / chunk
     timed = choices.duration_s is not None
     return BackFlow(
@@ -343,7 +343,7 @@ def back_flow(case: InvasionCase) -> BackFlow:
         scales=scales,
         choices=choices,
         chunks=max(1, round(chunks) if timed else math.ceil(chunks - 1e-9)),
-        quiet_chunks=0 if timed else max(1, math.ceil((choices.quiet_s or passage) / chunk)),
+        quiet_chunks=0 if timed else max(1, math.ceil(passage / chunk)),
     )
 
 
@@ -352,7 +352,9 @@ def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
 
     What its table [run] says of the length of the invasion is that of the clean-up.
     """
-    fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
+    own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
+    run = case.run.model_copy(update=own | {"duration_ms": choices.duration_ms})
+    fluid = case.fluid.model_copy(update={"overbalance_MPa": choices.drawdown_MPa})
     turned, asked = case.model_copy(update={"fluid": fluid, "run": run}), case.drag
     if asked.drive_velocity_m_s != "fluid":
         porosity = target_porosity(case)
