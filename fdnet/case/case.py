@@ -84,12 +84,14 @@ class Case(tables.Part):
     @property
     def size_m(self) -> tuple[float, float, float]:
         """Side lengths of the box (x, y, z), m."""
-        return self.box.size_m
+        x, y, z = self.box.size_mm
+        return x * 1e-3, y * 1e-3, z * 1e-3
 
     @property
     def periodic(self) -> tuple[bool, bool, bool]:
         """Which directions are periodic; the flow direction never is."""
-        return self.box.periodic
+        sideways = self.box.sides == "periodic"
+        return False, sideways, sideways
 
     @property
     def wall_friction(self) -> float:
@@ -102,11 +104,11 @@ class Case(tables.Part):
 
         Keys that only the other contact model reads are left out.
         """
-        data = self.model_dump(mode="json")
+        data = self.model_dump(mode="json", exclude_none=True)
         for name in ("grains", "fines"):
             for key in self.contact.other_keys & data.get(name, {}).keys():
                 del data[name][key]
-        return _without_none({key: data[key] for key in KEYS if key in data})
+        return {key: data[key] for key in KEYS if key in data}
 
     def toml(self) -> str:
         """The case as TOML, with every default."""
@@ -117,7 +119,7 @@ class Case(tables.Part):
 
         "pack" ignores fluid, run and analysis, and of the fines all but what decides the ratio of
         stiffnesses. "invade" ignores the analysis and the clean-up, "clean_up" the analysis, but
-        for side walls that let a fluid slip which is made with them (`walls_of_the_fluid`). No
+        for side walls of a fluid that the network is made for. No
         result depends on `POLICIES` or on the bonds, which mechanics alone reads, so no digest
         does. One stiffness for packing and invasion counts once.
         """
@@ -128,8 +130,9 @@ class Case(tables.Part):
         if stage != "pack" and packing == self.run.stiffness_N_m:
             data["grains"].pop("packing_stiffness_N_m")
         if stage in LIGGGHTS_STAGES:
-            data |= walls_of_the_fluid(stage, data)
-            data.pop("analysis")
+            walls = data.pop("analysis")["walls"]
+            followed = stage != "pack" and self.drag.field == "network"
+            data |= {"walls": walls} if followed and self.box.sides == "walls" else {}
             data.pop("name")
         if stage == "invade":
             data.pop("clean_up", None)
@@ -206,20 +209,6 @@ class InvasionCase(Case):
         return tuple(stage for stage in STAGES if stage != "clean_up" or self.clean_up)
 
 
-def walls_of_the_fluid(stage: str, data: Mapping[str, Any]) -> dict[str, str]:
-    """The key of the analysis that the fluid of `stage` depends on, if it does.
-
-    The network of `drag.field` = "network" is made with `analysis.walls`.
-
-    Args:
-        stage: "pack", "invade" or "clean_up".
-        data: the tables of a case.
-    """
-    network = stage != "pack" and data["drag"]["field"] == "network"
-    named = network and data["box"]["sides"] == "walls"
-    return {"walls": data["analysis"]["walls"]} if named else {}
-
-
 def case_type(data: Mapping[str, Any]) -> type[Case]:
     """The class that nested tables describe: a table of fines makes an invasion."""
     return InvasionCase if "fines" in data else Case
@@ -234,14 +223,6 @@ def with_fines(case: Case) -> InvasionCase:
     return case
 
 
-def _without_none(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_none(item) for key, item in value.items() if item is not None}
-    if isinstance(value, list):
-        return [_without_none(item) for item in value]
-    return value
-
-
 # ------------------------------------------------------------------------------------------------
 # Which keys of two cases differ, in words.
 
@@ -250,25 +231,19 @@ MOST_NAMED = 4
 """Most differing keys that a message names."""
 
 
-def differences(asked: Case, kept: Mapping[str, Any]) -> list[str]:
+def difference_text(asked: Case, kept: Mapping[str, Any]) -> str:
     """The dotted keys in which a case differs from the tables of another, with both values.
 
-    Keys that decide only whether a run may go on are left out.
+    Keys that decide only whether a run may go on are left out. Empty where nothing differs.
     """
     mine, other = dict(_flat(asked.data())), dict(_flat(kept))
-    return [
-        f"{key} = {_shown(other, key)} there, {_shown(mine, key)} here"
+    named = [
+        f"{key} = {str(other.get(key, 'absent'))[:40]} there, "
+        f"{str(mine.get(key, 'absent'))[:40]} here"
         for key in sorted(mine.keys() | other.keys())
         if mine.get(key) != other.get(key) and key.removeprefix("run.") not in POLICIES
     ]
-
-
-def difference_text(asked: Case, kept: Mapping[str, Any]) -> str:
-    """`differences` as the part of a message; empty where nothing differs."""
-    named = differences(asked, kept)
-    if not named:
-        return ""
-    more = f", and {len(named) - MOST_NAMED} more keys" if len(named) > MOST_NAMED else ""
+    more = f"; and {len(named) - MOST_NAMED} more keys" if len(named) > MOST_NAMED else ""
     return "; ".join(named[:MOST_NAMED]) + more
 
 
@@ -278,10 +253,6 @@ def _flat(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]
             yield from _flat(value, f"{path}{key}.")
         else:
             yield f"{path}{key}", value
-
-
-def _shown(flat: Mapping[str, Any], key: str) -> str:
-    return str(flat[key])[:40] if key in flat else "absent"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -496,8 +467,8 @@ def _of_the_invasion(known: Known) -> Iterator[str]:
     by_classes = method in ("network", "both")
     if known.given("cake.permeability_m2") and not by_classes:
         yield (
-            "cake: the table belongs to invasion.method = 'network' or 'both'; with spheres alone "
-            "the cake is that of the fines that LIGGGHTS moves; leave it out"
+            "cake: the table belongs to invasion.method = 'network' or 'both'; leave it out, for "
+            "spheres make their own cake"
         )
     if by_classes and known.given("clean_up.drawdown_MPa"):
         yield (

@@ -237,18 +237,13 @@ FILE = "file"
 
 @dataclass(slots=True)
 class Spoken:
-    """Nested tables in the keys of the models.
+    """Nested tables in the keys of the models."""
 
-    Attributes:
-        folder: where files that the case names are looked for.
-        data: the tables.
-        problems: what could not be understood, one sentence each.
-        bad: dotted keys, of at most two parts, whose value was refused.
-    """
-
-    folder: Path
-    data: dict[str, Any] = field(default_factory=dict)
+    folder: Path  # where files that the case names are looked for
+    data: dict[str, Any] = field(default_factory=dict)  # the tables
+    # what could not be understood, one sentence each
     problems: list[str] = field(default_factory=list)
+    # dotted keys, of at most two parts, whose value was refused
     bad: set[str] = field(default_factory=set)
 
     def refuse(self, key: str, problem: str) -> None:
@@ -595,17 +590,11 @@ QUICK = "quick-"
 
 
 class ShippedCase(NamedTuple):
-    """A case file that comes with fdnet.
+    """A case file that comes with fdnet."""
 
-    Attributes:
-        name: as `fdnet init --from` takes it; "quick-NAME" is the quick form of NAME.
-        path: of the file.
-        about: the first sentence of its comment.
-    """
-
-    name: str
-    path: Path
-    about: str
+    name: str  # as `fdnet init --from` takes it; "quick-NAME" is the quick form of NAME
+    path: Path  # of the file
+    about: str  # the first sentence of its comment
 
 
 def cases_folder() -> Path:

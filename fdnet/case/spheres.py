@@ -169,19 +169,12 @@ def _measured_problem(sizes: Sizes) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solid:
-    """One material of some spheres.
+    """One material of some spheres."""
 
-    Attributes:
-        name: as the case gives it; empty where there is one material.
-        share: of the volume of all solids of the case.
-        curve: diameters, m.
-        density: kg/m3.
-    """
-
-    name: str
-    share: float
-    curve: SizeCurve
-    density: float
+    name: str  # as the case gives it; empty where there is one material
+    share: float  # of the volume of all solids of the case
+    curve: SizeCurve  # diameters, m
+    density: float  # kg/m3
 
 
 class Material(Part):

@@ -222,18 +222,6 @@ class Box(Part):
     wall_friction: NonNegative | None = None
     """Sliding friction of side walls. When absent: that of the grains."""
 
-    @property
-    def size_m(self) -> tuple[float, float, float]:
-        """Side lengths (x, y, z), m."""
-        x, y, z = self.size_mm
-        return x * 1e-3, y * 1e-3, z * 1e-3
-
-    @property
-    def periodic(self) -> tuple[bool, bool, bool]:
-        """Which directions are periodic; the flow direction never is."""
-        sideways = self.sides == "periodic"
-        return False, sideways, sideways
-
 
 class Drag(Part):
     """[drag], the forces of the fluid on every fine: drag by its slip, and the pressure gradient.
@@ -536,7 +524,4 @@ def _refusal(item: Any) -> str:
     if item["type"] == "extra_forbidden":
         known = ", ".join(AnalysisChoices.model_fields)
         return f"analysis.{key}: unknown key; choose some of {known}"
-    what = (
-        item["msg"].replace("Input should be", "should be").replace("should be a valid", "is no")
-    )
-    return f"analysis.{key}: {item['input']!r} {what}"
+    return f"analysis.{key}: {item['input']!r} {item['msg'].replace('Input should', 'should')}"
