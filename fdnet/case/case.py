@@ -9,66 +9,27 @@ import hashlib
 import json
 import math
 import tomllib
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Any, Self
 
 import tomli_w
 from pydantic import Field, model_validator
 
+from fdnet.case import tables
 from fdnet.case.spheres import Fines, Grains, Spheres
-from fdnet.case.tables import (
-    DEEPEST_DAMPING,
-    LEAST_SKIN,
-    MAX_CONCENTRATION,
-    MODEL_KEYS,
-    MOST_BINS,
-    MOST_FINES,
-    MOST_GRAINS,
-    MOST_NEIGHBOUR_BINS,
-    MOST_SLAB,
-    OF_THE_UNIFORM,
-    AnalysisChoices,
-    Bonds,
-    Box,
-    CleanUp,
-    ContactLaw,
-    Drag,
-    Fluid,
-    Gravity,
-    InvasionChoices,
-    MudCake,
-    Part,
-    Run,
-    Well,
-)
 from fdnet.errors import CaseError
 from fdnet.names import LIGGGHTS_STAGES, STAGES, Stage
 
 POLICIES = ("max_hours", "max_overlap", "on_overlap")
 """Keys of [run] that decide whether a run may go on, not what it computes."""
 KEYS = (
-    "name",
-    "seed",
-    "box",
-    "grains",
-    "fines",
-    "fluid",
-    "well",
-    "drag",
-    "gravity",
-    "contact",
-    "invasion",
-    "cake",
-    "clean_up",
-    "bonds",
-    "run",
-    "analysis",
-    "given",
+    *("name", "seed", "box", "grains", "fines", "fluid", "well", "drag", "gravity", "contact"),
+    *("invasion", "cake", "clean_up", "bonds", "run", "analysis"),
 )
 """Keys at the top of a case file, in the order in which they are written."""
 
 
-class Case(Part):
+class Case(tables.Part):
     """A pack of grains. Without fines it stays intact: it is made and analysed, not invaded.
 
     The keys carry the unit of the user, as in a case file: `radius_mm`, `viscosity_cP`. Properties
@@ -92,19 +53,16 @@ class Case(Part):
     """
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
     """Seed of all random numbers. The same case and seed give the same result."""
-    box: Box
+    box: tables.Box
     grains: Grains
-    fluid: Fluid = Fluid()
-    well: Well | None = None
-    drag: Drag = Drag()
-    gravity: Gravity = Gravity()
-    contact: ContactLaw = ContactLaw()
-    bonds: Bonds | None = None
-    run: Run = Run()
-    analysis: AnalysisChoices = AnalysisChoices()
-    given: dict[str, str] = Field({})
-    """Written by fdnet: what the case gave with units or as a file, by dotted key. The other keys
-    hold the same as numbers, and only they count."""
+    fluid: tables.Fluid = tables.Fluid()
+    well: tables.Well | None = None
+    drag: tables.Drag = tables.Drag()
+    gravity: tables.Gravity = tables.Gravity()
+    contact: tables.ContactLaw = tables.ContactLaw()
+    bonds: tables.Bonds | None = None
+    run: tables.Run = tables.Run()
+    analysis: tables.AnalysisChoices = tables.AnalysisChoices()
 
     @model_validator(mode="after")
     def _tables_fit(self) -> Self:
@@ -126,12 +84,14 @@ class Case(Part):
     @property
     def size_m(self) -> tuple[float, float, float]:
         """Side lengths of the box (x, y, z), m."""
-        return self.box.size_m
+        x, y, z = self.box.size_mm
+        return x * 1e-3, y * 1e-3, z * 1e-3
 
     @property
     def periodic(self) -> tuple[bool, bool, bool]:
         """Which directions are periodic; the flow direction never is."""
-        return self.box.periodic
+        sideways = self.box.sides == "periodic"
+        return False, sideways, sideways
 
     @property
     def wall_friction(self) -> float:
@@ -144,13 +104,11 @@ class Case(Part):
 
         Keys that only the other contact model reads are left out.
         """
-        data = self.model_dump(mode="json")
-        if not self.given:
-            del data["given"]
+        data = self.model_dump(mode="json", exclude_none=True)
         for name in ("grains", "fines"):
             for key in self.contact.other_keys & data.get(name, {}).keys():
                 del data[name][key]
-        return _without_none({key: data[key] for key in KEYS if key in data})
+        return {key: data[key] for key in KEYS if key in data}
 
     def toml(self) -> str:
         """The case as TOML, with every default."""
@@ -161,20 +119,20 @@ class Case(Part):
 
         "pack" ignores fluid, run and analysis, and of the fines all but what decides the ratio of
         stiffnesses. "invade" ignores the analysis and the clean-up, "clean_up" the analysis, but
-        for side walls that let a fluid slip which is made with them (`walls_of_the_fluid`). No
+        for side walls of a fluid that the network is made for. No
         result depends on `POLICIES` or on the bonds, which mechanics alone reads, so no digest
         does. One stiffness for packing and invasion counts once.
         """
         data = self.data()
-        data.pop("given", None)
         data.pop("bonds", None)
         data["run"] = {key: value for key, value in data["run"].items() if key not in POLICIES}
         packing = data["grains"]["packing_stiffness_N_m"]
         if stage != "pack" and packing == self.run.stiffness_N_m:
             data["grains"].pop("packing_stiffness_N_m")
         if stage in LIGGGHTS_STAGES:
-            data |= walls_of_the_fluid(stage, data)
-            data.pop("analysis")
+            walls = data.pop("analysis")["walls"]
+            followed = stage != "pack" and self.drag.field == "network"
+            data |= {"walls": walls} if followed and self.box.sides == "walls" else {}
             data.pop("name")
         if stage == "invade":
             data.pop("clean_up", None)
@@ -191,7 +149,7 @@ class Case(Part):
         """What the stiffness of a pack depends on besides, with contacts that are not linear."""
         if self.contact.model == "hooke":
             return {}
-        fines, keys = self.spheres.get("fine"), sorted(MODEL_KEYS["hertz"])
+        fines, keys = self.spheres.get("fine"), sorted(tables.MODEL_KEYS["hertz"])
         size = {"mean_radius_m": fines.mean_radius_m} if fines else {}
         given = {key: data["fines"][key] for key in keys} if fines else {}
         return {"model": self.contact.model, "fines": size | given}
@@ -200,6 +158,7 @@ class Case(Part):
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
         try:
             data = tomllib.loads(text.decode())
+            data.pop("given", None)  # as runs of before have it
             return case_type(data).model_validate(data).digest() == self.digest()
         except ValueError:
             return False
@@ -219,9 +178,9 @@ class InvasionCase(Case):
     """
 
     fines: Fines
-    invasion: InvasionChoices | None = None
-    cake: MudCake | None = None
-    clean_up: CleanUp | None = None
+    invasion: tables.InvasionChoices | None = None
+    cake: tables.MudCake | None = None
+    clean_up: tables.CleanUp | None = None
 
     @property
     def by_classes(self) -> bool:
@@ -250,20 +209,6 @@ class InvasionCase(Case):
         return tuple(stage for stage in STAGES if stage != "clean_up" or self.clean_up)
 
 
-def walls_of_the_fluid(stage: str, data: Mapping[str, Any]) -> dict[str, str]:
-    """The key of the analysis that the fluid of `stage` depends on, if it does.
-
-    The network of `drag.field` = "network" is made with `analysis.walls`.
-
-    Args:
-        stage: "pack", "invade" or "clean_up".
-        data: the tables of a case.
-    """
-    network = stage != "pack" and data["drag"]["field"] == "network"
-    named = network and data["box"]["sides"] == "walls"
-    return {"walls": data["analysis"]["walls"]} if named else {}
-
-
 def case_type(data: Mapping[str, Any]) -> type[Case]:
     """The class that nested tables describe: a table of fines makes an invasion."""
     return InvasionCase if "fines" in data else Case
@@ -278,14 +223,6 @@ def with_fines(case: Case) -> InvasionCase:
     return case
 
 
-def _without_none(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _without_none(item) for key, item in value.items() if item is not None}
-    if isinstance(value, list):
-        return [_without_none(item) for item in value]
-    return value
-
-
 # ------------------------------------------------------------------------------------------------
 # Which keys of two cases differ, in words.
 
@@ -294,40 +231,28 @@ MOST_NAMED = 4
 """Most differing keys that a message names."""
 
 
-def differences(asked: Case, kept: Mapping[str, Any]) -> list[str]:
+def difference_text(asked: Case, kept: Mapping[str, Any]) -> str:
     """The dotted keys in which a case differs from the tables of another, with both values.
 
-    Keys that decide only whether a run may go on are left out, and what was given in words.
+    Keys that decide only whether a run may go on are left out. Empty where nothing differs.
     """
     mine, other = dict(_flat(asked.data())), dict(_flat(kept))
-    return [
-        f"{key} = {_shown(other, key)} there, {_shown(mine, key)} here"
+    named = [
+        f"{key} = {str(other.get(key, 'absent'))[:40]} there, "
+        f"{str(mine.get(key, 'absent'))[:40]} here"
         for key in sorted(mine.keys() | other.keys())
-        if mine.get(key) != other.get(key)
-        and not key.startswith("given.")
-        and key not in [f"run.{policy}" for policy in POLICIES]
+        if mine.get(key) != other.get(key) and key.removeprefix("run.") not in POLICIES
     ]
-
-
-def difference_text(asked: Case, kept: Mapping[str, Any]) -> str:
-    """`differences` as the part of a message; empty where nothing differs."""
-    named = differences(asked, kept)
-    if not named:
-        return ""
-    more = f", and {len(named) - MOST_NAMED} more keys" if len(named) > MOST_NAMED else ""
+    more = f"; and {len(named) - MOST_NAMED} more keys" if len(named) > MOST_NAMED else ""
     return "; ".join(named[:MOST_NAMED]) + more
 
 
-def _flat(tables: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in tables.items():
+def _flat(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{path}{key}.")
         else:
             yield f"{path}{key}", value
-
-
-def _shown(flat: Mapping[str, Any], key: str) -> str:
-    return str(flat[key])[:40] if key in flat else "absent"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -336,7 +261,19 @@ def _shown(flat: Mapping[str, Any], key: str) -> str:
 
 WIDEST_THROAT = math.sqrt(2) - 1
 """Radius of the widest throat between touching grains over their radius: four in a square."""
-_OF_MODELS = sorted(MODEL_KEYS["hooke"] | MODEL_KEYS["hertz"] | {"damping_ratio"})
+EXCLUSIVE = {
+    ("fines.cut_um", "fines.radius_mm"): "a cut is one of measured sizes; leave it out",
+    ("fines.count", "fines.slab_mm"): "give one of the two, or none: then mud comes until the end",
+    ("well.radius_mm", "fluid.velocity_m_s"): "each gives the velocity; keep one of them",
+    ("well.radius_mm", "fluid.darcy_length_mm"): "each gives the velocity; keep one of them",
+    ("clean_up.drawdown_MPa", "fluid.velocity_m_s"): "nothing says on which way the drawdown is "
+    "lost; give fluid.overbalance_MPa with [well] or fluid.darcy_length_mm, not the velocity",
+    ("cake.permeability_m2", "cake.api_filtrate_mL"): "each gives the cake; keep one of them",
+    ("run.cap_ms", "run.duration_ms"): "give one of the two",
+}
+"""Two keys that exclude each other, and why."""
+OF_THE_NETWORK = ("drag.drive", "drag.update_travel", "run.stop_rate", "run.stop_pore_volumes")
+"""Keys of a flow that follows the deposit; the uniform field keeps its first velocity."""
 
 
 def size_text(name: str, spheres: Spheres) -> str:
@@ -356,115 +293,135 @@ def concentration_text(fines: Fines) -> str:
     return f"fines.concentration: {fines.concentration:g}"
 
 
-def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iterator[str]:
+class Known:
+    """The tables of a case, and which of their keys something can be said about.
+
+    Nothing can be said about keys whose own value was refused (`bad`), and about sizes and solids
+    that are not given exactly once.
+    """
+
+    def __init__(self, given: Mapping[str, Any], bad: Collection[str]) -> None:
+        self.tables, self.bad, self.unclear = given, set(bad), set(bad)
+        for name in ("grains", "fines"):
+            if self[name] is None or not self[name].has_one_curve:
+                self.unclear.add(f"{name}.radius_mm")
+        if self["fines"] is None or not self["fines"].has_one_concentration:
+            self.unclear.add("fines.concentration")
+
+    def __getitem__(self, name: str) -> Any:
+        """A table, or None."""
+        return self.tables.get(name)
+
+    def given(self, *keys: str) -> bool:
+        """Whether the tables of these dotted keys are there, and none of the keys was refused."""
+        return not set(keys) & self.bad and all(self[key.split(".")[0]] for key in keys)
+
+    def good(self, *keys: str) -> bool:
+        """Whether something can be said about these dotted keys."""
+        return self.given(*keys) and not set(keys) & self.unclear
+
+    def value(self, key: str) -> Any:
+        """Of a dotted key; None where it has none, or nothing can be said about it."""
+        name, _, last = key.partition(".")
+        return getattr(self[name], last) if self.good(key) else None
+
+
+def cross_problems(given: Mapping[str, Any], bad: Collection[str] = ()) -> Iterator[str]:
     """What is wrong between the keys of a case, in the order in which it is reported.
 
     A rule is passed over where one of its tables is absent or None, or one of its keys is among
     `bad`: keys whose own value was refused, so that nothing can be said about them.
     """
-    at: Callable[[str], Any] = tables.get
-    box, grains, fines, bonds = at("box"), at("grains"), at("fines"), at("bonds")
-    fluid, well, drag, contact = at("fluid"), at("well"), at("drag"), at("contact")
-    run, clean_up, analysis = at("run"), at("clean_up"), at("analysis")
-    invasion, cake = at("invasion"), at("cake")
-    unsized = set(bad)
-    if grains is None or not grains.has_one_curve:
-        unsized.add("grains.radius_mm")
-    if fines is None or not fines.has_one_curve:
-        unsized.add("fines.radius_mm")
-    if fines is None or not fines.has_one_concentration:
-        unsized.add("fines.concentration")
+    known = Known(given, bad)
+    yield from _of_the_spheres(known)
+    for keys, why in EXCLUSIVE.items():
+        first, second = map(known.value, keys)
+        if first is not None and second is not None:
+            yield f"{keys[0]}: {first} with {keys[1]}: {second}: {why}"
+    yield from _of_the_amounts(known)
+    yield from _of_the_invasion(known)
+    yield from _of_the_forces(known)
+    yield from _of_the_contacts(known)
+    yield from _of_the_analysis(known)
 
-    def given(*keys: str) -> bool:
-        there = all(tables.get(key.split(".")[0]) is not None for key in keys)
-        return there and not set(keys) & set(bad)
 
-    def good(*keys: str) -> bool:
-        return given(*keys) and not set(keys) & unsized
-
-    # the sizes of grains and fines, their number, and the solids in the mud
-
-    if given("grains.radius_mm", "grains.sizes"):
-        yield from _one_curve("grains", ("radius_mm", "sizes"), grains)
-    if given("fines.radius_mm", "fines.sizes", "fines.materials"):
-        yield from _one_curve("fines", ("radius_mm", "sizes", "materials"), fines)
-    if (
-        given("fines.radius_mm", "fines.cut_um")
-        and fines.cut_um is not None
-        and not fines.measured
-        and fines.has_one_curve
-    ):
-        yield (
-            f"fines.cut_um: {fines.cut_um:g} cuts measured sizes, but the case gives "
-            "fines.radius_mm; leave it out or give fines.sizes"
-        )
-    # The solids are given once, and are no more than fit.
-    if given(
-        "fines.concentration", "fines.solids_kg_m3", "fines.materials", "fines.density_kg_m3"
-    ):
+def _of_the_spheres(known: Known) -> Iterator[str]:
+    """Sizes and solids are given once, and fines are smaller than grains."""
+    grains, fines = known["grains"], known["fines"]
+    for name, keys in {
+        "grains": ("radius_mm", "sizes"),
+        "fines": ("radius_mm", "sizes", "materials"),
+    }.items():
+        if known.given(*(f"{name}.{key}" for key in keys)) and not known[name].has_one_curve:
+            there = [f"{name}.{key}" for key in keys if getattr(known[name], key) is not None]
+            what = (
+                f"{there[1]}: given beside {there[0]}" if there else f"{name}.radius_mm: missing"
+            )
+            yield f"{what}, give exactly one of {', '.join(keys[:-1])} and {keys[-1]}"
+        pair = known.value(f"{name}.radius_mm")
+        if isinstance(pair, tuple) and pair[0] >= pair[1]:
+            yield f"{name}.radius_mm: {list(pair)} must rise, [smallest, largest]"
+    solids = ("concentration", "solids_kg_m3", "materials", "density_kg_m3")
+    if known.given(*(f"fines.{key}" for key in solids)):
         if not fines.has_one_concentration:
             yield (
                 f"fines.solids_kg_m3: {fines.solids_kg_m3} with fines.concentration: "
                 f"{fines.concentration}, give exactly one of the two"
             )
-        elif fines.solids_kg_m3 is not None and fines.volume_fraction > MAX_CONCENTRATION:
-            most = MAX_CONCENTRATION * fines.solids_density_kg_m3
+        elif fines.solids_kg_m3 is not None and fines.volume_fraction > tables.MAX_CONCENTRATION:
+            most = tables.MAX_CONCENTRATION
             yield (
-                f"fines.solids_kg_m3: {fines.solids_kg_m3:g} of solids of "
-                f"{fines.solids_density_kg_m3:.4g} kg/m3 is {100 * fines.volume_fraction:.3g} % "
-                f"by volume; expected at most {most:.3g} ({100 * MAX_CONCENTRATION:.0f} %: more "
-                "do not fit at random places)"
+                f"fines.solids_kg_m3: {fines.solids_kg_m3:g} is {100 * fines.volume_fraction:.3g} "
+                f"% by volume; expected at most {most * fines.solids_density_kg_m3:.3g} "
+                f"({100 * most:.0f} %: more do not fit at random places)"
             )
-    if given("fines.materials", "fines.friction"):
-        for number, one in enumerate(fines.materials or ()):
-            if one.friction is not None and one.friction != fines.friction:
-                yield (
-                    f"fines.materials.{number}.friction: {one.friction:g} of {one.name!r}, but "
-                    f"all fines are of one contact material with fines.friction "
-                    f"{fines.friction:g}; set fines.friction for all"
-                )
-    if given("fines.materials"):
-        names = [one.name for one in fines.materials or ()]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            yield f"fines.materials: {twice[0]!r} is listed twice, give each material once"
-    if good("grains.radius_mm"):
-        yield from _rising("grains", grains)
-    if good("fines.radius_mm"):
-        yield from _rising("fines", fines)
-    if (
-        good("grains.porosity", "grains.count")
-        and grains.porosity is None
-        and grains.count is None
-    ):
-        yield "grains.porosity: missing, give it (0 to 1) or grains.count"
-    if good("fines.count", "fines.slab_mm") and fines.count and fines.slab_mm:
+    names = [one.name for one in known.value("fines.materials") or ()]
+    for twice in {name for name in names if names.count(name) > 1}:
+        yield f"fines.materials: {twice!r} is listed twice, give each material once"
+    if not known.good("grains.radius_mm", "fines.radius_mm"):
+        return
+    largest, smallest = 2 * grains.radius_range_m[1], 2 * fines.radius_range_m[0]
+    if fines.measured and smallest > WIDEST_THROAT * largest:
         yield (
-            f"fines.count: {fines.count} with fines.slab_mm: {fines.slab_mm}, give one of the two,"
-            " or none for mud that comes until the stop rule"
+            f"fines.sizes: the smallest fine has {1e3 * smallest:.3g} mm, above every throat "
+            f"between touching grains of up to {1e3 * largest:.3g} mm (at most "
+            f"{1e3 * WIDEST_THROAT * largest:.3g} mm): nothing could invade; check the units of "
+            "both curves"
         )
-    if good("fines.count", "fines.slab_mm") and fines.endless and fines.supply == "slab":
+    elif fines.radius_range_m[1] >= grains.radius_range_m[0]:
+        yield (
+            f"{size_text('fines', fines)}, expected below {size_text('grains', grains)}: "
+            "solids as large as the grains only lie in the cake"
+            + ("; leave them out by fines.sizes.cut_percent" if fines.measured else "")
+        )
+
+
+def _of_the_amounts(known: Known) -> Iterator[str]:
+    """Grains fit into the box and fines into their slab, and there are not too many of them."""
+    box, grains, fines = known["box"], known["grains"], known["fines"]
+    if known.good("grains.porosity", "grains.count") and grains.porosity is grains.count is None:
+        yield "grains.porosity: missing, give it (0 to 1) or grains.count"
+    counted = known.good("fines.count", "fines.slab_mm")
+    if counted and fines.endless and known.value("fines.supply") == "slab":
         yield (
             "fines.supply: 'slab' puts all fines in at the start, but nothing says how many; give "
             "fines.count or fines.slab_mm, or take 'batches'"
         )
-    # Their number is bounded by memory, their plain sum of volumes by the box.
-    if good("box.size_mm", "grains.radius_mm", "grains.porosity", "grains.count"):
+    if known.good("box.size_mm", "grains.radius_mm", "grains.porosity", "grains.count"):
         volume, grain = math.prod(box.size_mm), grains.mean_volume_m3 * 1e9
         solid = 1 - grains.porosity if grains.porosity is not None else 0.0
         expected = grains.count or solid * volume / grain
-        if expected > MOST_GRAINS:
+        if expected > tables.MOST_GRAINS:
             yield (
                 f"box.size_mm: {list(box.size_mm)} holds {expected:.3g} grains; expected at most "
-                f"{MOST_GRAINS:.0e}"
+                f"{tables.MOST_GRAINS:.0e}"
             )
-        if grains.count is not None and grains.count * grains.mean_volume_m3 * 1e9 >= volume:
+        if grains.count is not None and grains.count * grain >= volume:
             yield (
                 f"grains.count: {grains.count} spheres sum to more than the box; expected at most "
                 f"{int(volume / grain)}"
             )
-    # A grain fits, and does not meet its own image across a periodic side.
-    if good("box.size_mm", "box.sides", "grains.radius_mm"):
+    if known.good("box.size_mm", "box.sides", "grains.radius_mm"):
         diameter = 2e3 * grains.radius_range_m[1]
         for axis, side in zip("xyz", box.size_mm, strict=True):
             imaged = box.sides == "periodic" and axis != "x"
@@ -480,309 +437,170 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
                     f"box.size_mm: side {axis} is {side:g} mm, expected at least {least:g} mm "
                     f"({why})"
                 )
-    # The slab must hold its fines and stay a slab; their number is bounded by memory.
-    if good(
-        *("box.size_mm", "fines.radius_mm", "fines.count", "fines.slab_mm"),
-        *("fines.concentration", "fines.solids_kg_m3"),
-    ):
-        area = box.size_mm[1] * box.size_mm[2]
-        volume, fraction = fines.mean_volume_m3 * 1e9, fines.placed_fraction
+    supply = ("radius_mm", "count", "slab_mm", "concentration", "solids_kg_m3")
+    if known.good("box.size_mm", *(f"fines.{key}" for key in supply)):
+        area, fraction = box.size_mm[1] * box.size_mm[2], fines.placed_fraction
+        volume = fines.mean_volume_m3 * 1e9
         count = fines.count or fraction * area * (fines.slab_mm or 0.0) / volume
         length = fines.slab_mm or count * volume / (fraction * area)
-        if count > MOST_FINES:
+        if count > tables.MOST_FINES:
             yield (
-                f"fines.count: {count:.3g} fines, expected at most {MOST_FINES:.0e}; shorten the "
-                + ("slab or raise fines.cut_um" if fines.measured else "slab")
+                f"fines.count: {count:.3g} fines, expected at most {tables.MOST_FINES:.0e}; "
+                "shorten the slab" + " or raise fines.cut_um" * fines.measured
             )
-        if length > MOST_SLAB * box.size_mm[0]:
+        if length > tables.MOST_SLAB * box.size_mm[0]:
             yield (
                 f"{concentration_text(fines)} makes a slab of {length:.3g} mm, "
-                f"expected at most {MOST_SLAB} box lengths; raise it or supply fewer fines"
+                f"expected at most {tables.MOST_SLAB} box lengths; raise it or supply fewer fines"
             )
-    if (
-        good("grains.radius_mm", "fines.radius_mm")
-        and fines.radius_range_m[1] >= grains.radius_range_m[0]
-        and not list(_some_throat(grains, fines))
-    ):
+    outer, radius = known.value("well.drainage_radius_m"), known.value("well.radius_mm")
+    if outer is not None and radius is not None and outer <= 1e-3 * radius:
         yield (
-            f"{size_text('fines', fines)}, expected below {size_text('grains', grains)}: "
-            "solids as large as the grains only lie in the cake"
-            + ("; leave them out by fines.sizes.cut_percent" if fines.measured else "")
-        )
-    if good("grains.radius_mm", "fines.radius_mm"):
-        yield from _some_throat(grains, fines)
-    # The skin lies between a hundredth of a fine and a grain.
-    if good("run.skin_mm", "grains.radius_mm", "fines.radius_mm"):
-        low, high = LEAST_SKIN * 1e3 * fines.radius_range_m[0], 1e3 * grains.radius_range_m[1]
-        if run.skin_mm is not None and not low <= run.skin_mm <= high:
-            yield (
-                f"run.skin_mm: {run.skin_mm:g} mm, expected {low:.3g} ({LEAST_SKIN:g} of the "
-                "smallest fine's radius: else neighbours are searched anew nearly every step) to "
-                f"{high:.3g} (a grain's radius)"
-            )
-    # The bins of an invasion's neighbour search lie between memory's limit and the box.
-    if good("run.neighbour_bin_mm", "box.size_mm", "fines"):
-        least, most = (math.prod(box.size_mm) / MOST_NEIGHBOUR_BINS) ** (1 / 3), min(box.size_mm)
-        if run.neighbour_bin_mm is not None and not least <= run.neighbour_bin_mm <= most:
-            yield (
-                f"run.neighbour_bin_mm: {run.neighbour_bin_mm:g} mm, expected {least:.3g} "
-                f"({MOST_NEIGHBOUR_BINS:.0e} bins in the box) to {most:.3g} (its shortest side)"
-            )
-
-    # how fast the fluid moves, and how it is turned back
-
-    # A well gives the velocity, so nothing else may.
-    if good("well", "fluid.velocity_m_s", "fluid.darcy_length_mm"):
-        drives = [
-            f"fluid.{name} = {value:g}"
-            for name in ("velocity_m_s", "darcy_length_mm")
-            if (value := getattr(fluid, name)) is not None
-        ]
-        if drives:
-            yield (
-                f"well: the table [well] with {' and '.join(drives)}: each gives the velocity of "
-                "the fluid; keep one of them"
-            )
-    if (
-        good("well.radius_mm", "well.drainage_radius_m")
-        and well.drainage_radius_m <= well.radius_m
-    ):
-        yield (
-            f"well.drainage_radius_m: {well.drainage_radius_m:g} m is not above the radius of the "
-            f"well, well.radius_mm = {well.radius_mm:g} ({well.radius_m:g} m)"
-        )
-    if (
-        good("drag.drive_velocity_m_s", "contact.cohesion_J_m3")
-        and drag.drive_velocity_m_s not in ("auto", "fluid")
-        and contact.cohesion_J_m3 is not None
-    ):
-        yield (
-            f"drag.drive_velocity_m_s: {drag.drive_velocity_m_s} with contact.cohesion_J_m3: the "
-            "forces of the fluid are scaled, cohesion is not, so their ratio would be wrong; "
-            "leave out one of the two"
-        )
-    if good("clean_up.drawdown_MPa", "fluid.velocity_m_s") and fluid.velocity_m_s is not None:
-        yield (
-            f"clean_up.drawdown_MPa: {clean_up.drawdown_MPa:g} with fluid.velocity_m_s "
-            f"{fluid.velocity_m_s:g}: nothing says on which way the drawdown is lost; give "
-            "fluid.overbalance_MPa with the table [well] or with fluid.darcy_length_mm instead of "
-            "the velocity"
-        )
-    if good("clean_up.duration_ms", "clean_up.cap_ms", "clean_up.quiet_ms"):
-        for name in ("cap_ms", "quiet_ms") if clean_up.duration_ms is not None else ():
-            if (value := getattr(clean_up, name)) is not None:
-                yield (
-                    f"clean_up.{name}: {value:g} together with clean_up.duration_ms "
-                    f"{clean_up.duration_ms:g}: give one of the two"
-                )
-
-    # the mud as size classes on the network
-
-    by_classes = given("invasion.method") and invasion.method != "liggghts"
-    if given("cake.permeability_m2", "cake.api_filtrate_mL"):
-        given_twice = cake.permeability_m2 is not None and cake.api_filtrate_mL is not None
-        if given_twice:
-            yield (
-                f"cake.permeability_m2: {cake.permeability_m2:g} with cake.api_filtrate_mL "
-                f"{cake.api_filtrate_mL:g}: each gives the cake, keep one of them"
-            )
-        if not by_classes:
-            yield (
-                "cake: the table belongs to invasion.method = 'network' or 'both'; with spheres "
-                "alone the cake is that of the fines that LIGGGHTS moves; leave it out"
-            )
-    if by_classes and given("clean_up.drawdown_MPa"):
-        yield (
-            f"clean_up: with invasion.method = {invasion.method!r} nothing turns the flow back; "
-            "leave the table out, or take 'liggghts'"
-        )
-    if by_classes and good("grains.motion") and grains.motion == "mobile":
-        yield (
-            f"grains.motion: 'mobile' with invasion.method = {invasion.method!r}, whose pores are "
-            "those of grains that stay; take 'fixed'"
-        )
-    if by_classes and good("drag.field") and invasion.method == "both" and not drag.coupled:
-        yield (
-            f"drag.field: {drag.field!r} with invasion.method = 'both', whose spheres and classes "
-            "share one flow; leave it out, or take 'network'"
+            f"well.drainage_radius_m: {outer:g} m is not above the radius of the well, "
+            f"well.radius_mm = {radius:g}"
         )
 
-    # the forces of the fluid
 
-    # The network has one way for each of these; it alone knows the drive and the updates.
-    if good("drag.field", *(f"drag.{key}" for key in OF_THE_UNIFORM)) and drag.coupled:
-        for key in OF_THE_UNIFORM:
-            value, only = getattr(drag, key), Drag.model_fields[key].default
-            if value != only:
+def _of_the_invasion(known: Known) -> Iterator[str]:
+    """What size classes on the network exclude, and what they need."""
+    method = known.value("invasion.method")
+    by_classes = method in ("network", "both")
+    if known.given("cake.permeability_m2") and not by_classes:
+        yield (
+            "cake: the table belongs to invasion.method = 'network' or 'both'; leave it out, for "
+            "spheres make their own cake"
+        )
+    if by_classes and known.given("clean_up.drawdown_MPa"):
+        yield (
+            f"clean_up: with invasion.method = {method!r} nothing turns the flow back; leave the "
+            "table out, or take 'liggghts'"
+        )
+    if method == "both" and known.value("drag.field") == "uniform":
+        yield (
+            "drag.field: 'uniform' with invasion.method = 'both', whose spheres and classes share "
+            "one flow; leave it out, or take 'network'"
+        )
+    coupled = known.value("drag.field") == "network"
+    if known.value("grains.motion") == "mobile" and (by_classes or coupled):
+        what = f"invasion.method = {method!r}" if by_classes else "drag.field 'network'"
+        yield (
+            f"grains.motion: 'mobile' with {what}, whose pores are those of grains that stay; "
+            "take 'fixed', or spheres with drag.field = 'uniform'"
+        )
+
+
+def _of_the_forces(known: Known) -> Iterator[str]:
+    """The network has one way for some keys of [drag] that the uniform field leaves open."""
+    drag, fines = known["drag"], known["fines"]
+    driven = known.value("drag.drive_velocity_m_s")
+    if isinstance(driven, float | int) and known.value("contact.cohesion_J_m3") is not None:
+        yield (
+            f"drag.drive_velocity_m_s: {driven} with contact.cohesion_J_m3: the forces of the "
+            "fluid are scaled, cohesion is not, so their ratio would be wrong; leave out one of "
+            "the two"
+        )
+    if not known.good("drag.field"):
+        return
+    if drag.coupled:
+        for key in tables.OF_THE_UNIFORM:
+            value, only = getattr(drag, key), tables.Drag.model_fields[key].default
+            if known.good(f"drag.{key}") and value != only:
                 yield (
                     f"drag.{key}: {value!r} belongs to drag.field 'uniform'; leave it out, or set "
                     "drag.field = 'uniform'"
                 )
-    for key in ("drive", "update_travel"):
-        given_one = good("drag.field", f"drag.{key}") and getattr(drag, key) is not None
-        if given_one and not drag.coupled:
+        rate = known.value("run.stop_rate")
+        if rate is not None and known.value("drag.drive") == "rate":
             yield (
-                f"drag.{key}: {getattr(drag, key)!r} belongs to drag.field 'network'; the uniform "
-                "field always has its first velocity; leave it out"
+                f"run.stop_rate: {rate:g} needs a rate that falls; leave it out, or set "
+                "drag.drive = 'pressure'"
             )
-    if good("drag.field", "grains.motion") and drag.coupled and grains.motion == "mobile":
-        yield (
-            "grains.motion: 'mobile' with drag.field 'network', whose pores are those of grains "
-            "that stay; take 'fixed', or set drag.field = 'uniform'"
-        )
-    if (
-        good("run.stop_rate", "drag.field", "drag.drive")
-        and run.stop_rate is not None
-        and not drag.slowed
-    ):
-        yield (
-            f"run.stop_rate: {run.stop_rate:g} needs a rate that falls; leave it out, or set "
-            "drag.field = 'network' with drag.drive = 'pressure'"
-        )
-    # The uniform field keeps no account of the volume: it is the rate times the time.
-    if (
-        good("run.stop_pore_volumes", "drag.field")
-        and run.stop_pore_volumes is not None
-        and drag.field != "network"
-    ):
-        yield (
-            f"run.stop_pore_volumes: {run.stop_pore_volumes:g} needs drag.field = 'network', but "
-            f"it is {drag.field!r}; set run.duration_ms, since the uniform field keeps its rate"
-        )
-    if (
-        good("drag.scheme", "drag.refresh_steps")
-        and not drag.coupled
-        and drag.scheme != "held"
-        and drag.refresh_steps not in (None, 1)
-    ):
-        yield (
-            f"drag.refresh_steps: {drag.refresh_steps} belongs to drag.scheme 'held', not "
-            f"{drag.scheme!r}"
-        )
-    if (
-        good("drag.scheme", "fines.radius_mm")
-        and not drag.coupled
-        and drag.scheme == "viscous"
-        and not fines.one_size
-    ):
+        return
+    for key in OF_THE_NETWORK:
+        if (value := known.value(key)) is not None:
+            yield (
+                f"{key}: {value!r} belongs to drag.field 'network'; the uniform field always has "
+                "its first velocity; leave it out"
+            )
+    if not known.good("drag.scheme"):
+        return
+    every = known.value("drag.refresh_steps")
+    if drag.scheme != "held" and every not in (None, 1):
+        yield f"drag.refresh_steps: {every} belongs to drag.scheme 'held', not {drag.scheme!r}"
+    if drag.scheme == "viscous" and known.good("fines.radius_mm") and not fines.one_size:
         yield (
             f"drag.scheme: 'viscous' needs fines of one size, {size_text('fines', fines)} "
             "(LIGGGHTS's viscous force is one number a material); take 'held' or 'implicit'"
         )
-    if (
-        good("drag.scheme", "drag.upstream")
-        and drag.scheme == "implicit"
-        and drag.upstream == "darcy"
-        and not drag.coupled
-    ):
+    if drag.scheme == "implicit" and known.value("drag.upstream") == "darcy":
         yield (
-            "drag.upstream: 'darcy' changes the fluid's velocity at x = 0, drag.scheme "
-            "'implicit' keeps one a fine; take 'interstitial', or another drag.scheme"
+            "drag.upstream: 'darcy' changes the fluid's velocity at x = 0, drag.scheme 'implicit' "
+            "keeps one a fine; take 'interstitial', or another drag.scheme"
         )
-    if (
-        good("drag.scheme", "drag.inertia")
-        and not drag.coupled
-        and drag.inertia != "none"
-        and drag.scheme in ("viscous", "implicit")
-    ):
+    if drag.scheme != "held" and known.value("drag.inertia") == "schiller-naumann":
         yield (
-            f"drag.inertia: {drag.inertia!r} makes the drag coefficient depend on the slip, "
+            "drag.inertia: 'schiller-naumann' makes the drag coefficient depend on the slip, "
             f"drag.scheme {drag.scheme!r} keeps one a fine; take 'held'"
         )
 
-    # contacts, the end of a run, and the analysis
 
-    if good("contact.model", *(f"grains.{key}" for key in _OF_MODELS)):
-        yield from _of_the_model("grains", contact, grains)
-    if good("contact.model", *(f"fines.{key}" for key in _OF_MODELS)):
-        yield from _of_the_model("fines", contact, fines)
-    if (
-        good("contact.model", "contact.cohesion_J_m3")
-        and contact.cohesion_J_m3 is not None
-        and contact.model == "hooke"
-    ):
-        yield (
-            f"contact.cohesion_J_m3: {contact.cohesion_J_m3:g} with contact.model 'hooke': the "
-            "attraction of LIGGGHTS's SJKR grows with the overlap as a linear spring does, so it "
-            "would only soften the contact and never pull; take contact.model = 'hertz'"
-        )
-    if good("contact.rolling_friction", "grains.friction", "fines.friction"):
-        least = min(grains.friction, fines.friction)
-        if contact.rolling_friction is not None and least == 0:
+def _of_the_contacts(known: Known) -> Iterator[str]:
+    """The contact model takes what grains and fines give, and can do what is asked of it."""
+    contact, bonds = known["contact"], known["bonds"]
+    read = sorted(tables.MODEL_KEYS["hooke"] | tables.MODEL_KEYS["hertz"] | {"damping_ratio"})
+    for name in ("grains", "fines"):
+        if not known.good("contact.model", *(f"{name}.{key}" for key in read)):
+            continue
+        spheres = known[name]
+        unread = sorted(contact.other_keys & spheres.model_fields_set)
+        if unread:
             yield (
-                f"contact.rolling_friction: {contact.rolling_friction:g} without friction "
-                "(grains.friction or fines.friction is 0): spheres that slide do not roll; give "
-                "both a friction, or leave contact.rolling_friction out"
+                f"{', '.join(f'{name}.{key}' for key in unread)}: not read by contact.model "
+                f"{contact.model!r}; leave out, or choose the other contact.model"
             )
-    if good("bonds.tensile_strength_MPa", "bonds.shear_strength_MPa") and (
-        bonds.tensile_strength_MPa is None
-    ) != (bonds.shear_strength_MPa is None):
-        absent = "tensile" if bonds.tensile_strength_MPa is None else "shear"
+        if contact.model == "hertz" and spheres.damping_ratio > tables.DEEPEST_DAMPING:
+            yield (
+                f"{name}.damping_ratio: {spheres.damping_ratio:g} with contact.model 'hertz', "
+                f"expected at most {tables.DEEPEST_DAMPING:g} (a restitution above 0.05)"
+            )
+    cohesion = known.value("contact.cohesion_J_m3")
+    if cohesion is not None and known.value("contact.model") == "hooke":
         yield (
-            f"bonds.{absent}_strength_MPa: missing next to the other strength; give both, or "
-            "neither for bonds that never break"
+            f"contact.cohesion_J_m3: {cohesion:g} with contact.model 'hooke': the attraction of "
+            "LIGGGHTS's SJKR grows with the overlap as a linear spring does, so it would only "
+            "soften the contact and never pull; take contact.model = 'hertz'"
         )
-    if (
-        good("run.duration_ms", "run.cap_ms")
-        and run.duration_ms is not None
-        and run.cap_ms is not None
-    ):
+    rolling = known.value("contact.rolling_friction")
+    frictions = {known.value("grains.friction"), known.value("fines.friction")}
+    if rolling is not None and 0 in frictions and None not in frictions:
         yield (
-            f"run.cap_ms: {run.cap_ms} together with run.duration_ms {run.duration_ms}: "
-            "give one of the two"
+            f"contact.rolling_friction: {rolling:g} without friction (grains.friction or "
+            "fines.friction is 0): spheres that slide do not roll; give both a friction, or leave "
+            "contact.rolling_friction out"
         )
-    if good("analysis.sections") and isinstance(analysis.sections, tuple):
+    strengths = ("tensile_strength_MPa", "shear_strength_MPa")
+    if known.good(*(f"bonds.{key}" for key in strengths)):
+        absent = [key for key in strengths if getattr(bonds, key) is None]
+        if len(absent) == 1:
+            yield (
+                f"bonds.{absent[0]}: missing next to the other strength; give both, or neither: "
+                "then bonds never break"
+            )
+
+
+def _of_the_analysis(known: Known) -> Iterator[str]:
+    """Its laws go together; sections and bins are as a case gives them, not as Python does."""
+    analysis, thickness = known["analysis"], known.value("analysis.profile_bin_mm")
+    if isinstance(known.value("analysis.sections"), tuple):
         yield f"analysis.sections: {analysis.sections}: a case gives the number of sections"
-    if good("analysis.law", "analysis.damage_law"):
+    if known.good("analysis.law", "analysis.damage_law"):
         yield from analysis.refusals()
-    if good("box.size_mm", "analysis.profile_bin_mm"):
-        thickness = analysis.profile_bin_mm
-        if thickness is None:
-            yield "analysis.profile_bin_mm: missing, a case gives the thickness of its bins"
-        elif box.size_mm[0] / thickness > MOST_BINS:
+    if known.good("analysis.profile_bin_mm") and thickness is None:
+        yield "analysis.profile_bin_mm: missing, a case gives the thickness of its bins"
+    elif thickness and known.good("box.size_mm"):
+        length = known["box"].size_mm[0]
+        if length / thickness > tables.MOST_BINS:
             yield (
-                f"analysis.profile_bin_mm: {thickness:g} cuts {box.size_mm[0]:g} mm into more "
-                f"than {MOST_BINS} bins; expected at least {box.size_mm[0] / MOST_BINS:.3g}"
+                f"analysis.profile_bin_mm: {thickness:g} cuts {length:g} mm into more than "
+                f"{tables.MOST_BINS} bins; expected at least {length / tables.MOST_BINS:.3g}"
             )
-
-
-def _one_curve(name: str, keys: tuple[str, ...], spheres: Spheres) -> Iterator[str]:
-    given = [key for key in keys if getattr(spheres, key) is not None]
-    choice = f"give exactly one of {', '.join(keys[:-1])} and {keys[-1]}"
-    if not given:
-        yield f"{name}.radius_mm: missing, {choice}"
-    elif len(given) > 1:
-        yield f"{name}.{given[1]}: given beside {name}.{given[0]}, {choice}"
-
-
-def _rising(name: str, spheres: Spheres) -> Iterator[str]:
-    pair = spheres.radius_mm
-    if isinstance(pair, tuple) and pair[0] >= pair[1]:
-        yield f"{name}.radius_mm: {list(pair)} must rise, [smallest, largest]"
-
-
-def _some_throat(grains: Grains, fines: Fines) -> Iterator[str]:
-    """Measured fines of which none fits through any throat between touching grains."""
-    largest, smallest = 2 * grains.radius_range_m[1], 2 * fines.radius_range_m[0]
-    widest = WIDEST_THROAT * largest
-    if fines.measured and smallest > widest:
-        yield (
-            f"fines.sizes: the smallest fine has {1e3 * smallest:.3g} mm, above every throat "
-            f"between touching grains of up to {1e3 * largest:.3g} mm (at most "
-            f"{1e3 * widest:.3g} mm): nothing could invade; check the units of both curves"
-        )
-
-
-def _of_the_model(name: str, contact: ContactLaw, spheres: Spheres) -> Iterator[str]:
-    """The contact model takes what the table `name` ("grains", "fines") gives."""
-    unread = sorted(contact.other_keys & spheres.model_fields_set)
-    if unread:
-        yield (
-            f"{', '.join(f'{name}.{key}' for key in unread)}: not read by contact.model "
-            f"{contact.model!r}; leave out, or choose the other contact.model"
-        )
-    if contact.model == "hertz" and spheres.damping_ratio > DEEPEST_DAMPING:
-        yield (
-            f"{name}.damping_ratio: {spheres.damping_ratio:g} with contact.model 'hertz', "
-            f"expected at most {DEEPEST_DAMPING:g} (LIGGGHTS takes a restitution above 0.05)"
-        )

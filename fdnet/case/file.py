@@ -3,12 +3,12 @@
 import copy
 import csv
 import difflib
+import itertools
 import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
-from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -58,8 +58,7 @@ def read_size_file(
 
     Raises ValueError, with the file and what was expected, where it cannot be read so.
     """
-    path = expanded(name)
-    path = path if path.is_absolute() else folder / path
+    path = folder / expanded(name)
     try:
         text = text_of(file_bytes(path, most=SMALL, what="a table of sizes"), path)
     except CaseError as error:
@@ -198,6 +197,12 @@ def table_of(annotation: Any) -> type[Part] | None:
 
 
 REMOVED_KEYS = {"clean_up.lift_cake": "the cake is always lifted, remove the key"}
+REMOVED_KEYS |= dict.fromkeys(
+    ("clean_up.quiet_ms", "clean_up.cap_ms"), "give clean_up.duration_ms, or leave it out"
+)
+REMOVED_KEYS |= dict.fromkeys(
+    ("run.skin_mm", "run.neighbour_bin_mm"), "fdnet chooses the neighbour search, remove the key"
+)
 """Keys that are gone, and what to do without each."""
 
 
@@ -208,25 +213,15 @@ def nearest(path: str) -> str:
         return f"; {REMOVED_KEYS[path]}"
     if table in ("grains", "fines") and _DIAMETER.match(key):
         return f'; did you mean {table}.sizes = {{ D10 = "20 um", D50 = "40 um", ... }}?'
-    stems = {one: stem_of(one.rpartition(".")[2]) for one in known_keys()}
-    here = {one: stem for one, stem in stems.items() if one.rpartition(".")[0] == table}
 
-    def near_in(keys: Mapping[str, str]) -> Iterator[str]:
-        """The key of nearly the same spelling; tables and units count for nothing."""
-        first = {stem: one for one, stem in reversed([*keys.items()])}
-        close = difflib.get_close_matches(stem_of(key), first, n=1, cutoff=0.65)
-        return (first[one] for one in close)
+    def likeness(one: str) -> float:
+        """Of the spelling without units, 0 to 1; a key of the same table is likelier."""
+        other, _, name = one.rpartition(".")
+        alike = difflib.SequenceMatcher(None, stem_of(key), stem_of(name)).ratio()
+        return alike + 0.2 * (other == table)
 
-    near = next(
-        chain(
-            (one for one, stem in here.items() if stem == stem_of(key)),
-            near_in(here),
-            (one for one, stem in stems.items() if stem == stem_of(key)),
-            near_in(stems),
-        ),
-        None,
-    )
-    return f"; did you mean {near}?" if near else ""
+    best = max(known_keys(), key=likeness)
+    return f"; did you mean {best}?" if likeness(best) >= 0.75 else ""
 
 
 # ------------------------------------------------------------------------------------------------
@@ -234,7 +229,6 @@ def nearest(path: str) -> str:
 #
 # A key without the unit in its name takes a text with the unit, `viscosity = "10 cP"`, and stands
 # for the key with the unit, `viscosity_cP = 10`. A share takes a percentage, `porosity = "38 %"`.
-# What was given so is kept in the table `given` of the resolved case.
 
 
 FILE = "file"
@@ -243,18 +237,13 @@ FILE = "file"
 
 @dataclass(slots=True)
 class Spoken:
-    """Nested tables in the keys of the models.
+    """Nested tables in the keys of the models."""
 
-    Attributes:
-        data: the tables.
-        given: what was written, by dotted key.
-        problems: what could not be understood, one sentence each.
-        bad: dotted keys, of at most two parts, whose value was refused.
-    """
-
-    data: dict[str, Any]
-    given: dict[str, str] = field(default_factory=dict)
+    folder: Path  # where files that the case names are looked for
+    data: dict[str, Any] = field(default_factory=dict)  # the tables
+    # what could not be understood, one sentence each
     problems: list[str] = field(default_factory=list)
+    # dotted keys, of at most two parts, whose value was refused
     bad: set[str] = field(default_factory=set)
 
     def refuse(self, key: str, problem: str) -> None:
@@ -268,45 +257,36 @@ def plain_tables(model: type[Part], data: Mapping[str, Any], folder: Path) -> Sp
 
     `folder` is where files that the case names are looked for.
     """
-    spoken = Spoken(data={})
-    earlier = data.get("given")
-    if isinstance(earlier, Mapping):
-        data = {key: value for key, value in data.items() if key != "given"}
-    spoken.data = _table(spoken, model, data, path="", folder=folder)
+    spoken = Spoken(folder)
+    spoken.data = _table(spoken, model, data, path="")
     for dotted in spoken.bad:  # so that nothing else is said of these keys
         name, _, key = dotted.partition(".")
         table = spoken.data if not key else spoken.data.get(name)
         if isinstance(table, dict):
             table.pop(key or name, None)
-    if isinstance(earlier, Mapping):
-        kept = {str(key): text for key, text in earlier.items() if _holds(key, text, spoken.data)}
-        spoken.given = kept | spoken.given
-    if spoken.given:
-        spoken.data["given"] = spoken.given
     return spoken
 
 
 def _table(
-    spoken: Spoken, model: type[Part], table: Mapping[str, Any], *, path: str, folder: Path
+    spoken: Spoken, model: type[Part], table: Mapping[str, Any], *, path: str
 ) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for key, value in table.items():
         dotted, fields = f"{path}{key}", model.model_fields
         inner = table_of(fields[key].annotation) if key in fields else None
         if inner is not None and isinstance(value, Mapping):
-            result[key] = _table(spoken, inner, value, path=f"{dotted}.", folder=folder)
+            result[key] = _table(spoken, inner, value, path=f"{dotted}.")
         elif inner is not None and isinstance(value, list) and key == "materials":
             result[key] = [
-                _table(spoken, inner, one, path=f"{dotted}.{number}.", folder=folder)
+                _table(spoken, inner, one, path=f"{dotted}.{number}.")
                 if isinstance(one, Mapping)
                 else one
                 for number, one in enumerate(value)
             ]
         elif key in fields:
             result[key] = _percentage(spoken, dotted, key, value)
-        elif model is Sizes and key == FILE:
-            more = _curve(spoken, dotted, value, table, folder)
-            result = {**result, **more, **result}
+        elif model is Sizes and key == "file":
+            result = {**result, **_curve(spoken, dotted, value, table), **result}
         else:
             more = _with_unit(spoken, model, table, key=key, dotted=dotted)
             result = {**result, **more, **result}
@@ -318,12 +298,10 @@ def _percentage(spoken: Spoken, dotted: str, key: str, value: Any) -> Any:
     if not isinstance(value, str) or suffix_of(key) or not value.rstrip().endswith("%"):
         return value
     try:
-        share = share_of(value)
+        return share_of(value)
     except ValueError as error:
         spoken.refuse(dotted, f"{value!r}: {error}")
         return value
-    spoken.given[dotted] = value
-    return share
 
 
 def _with_unit(
@@ -334,35 +312,24 @@ def _with_unit(
     if len(meant) != 1:
         return {key: table[key]}
     target, value = meant[0], table[key]
+    texts = list(value) if isinstance(value, list | tuple) else [value]
     if target in table:
         spoken.refuse(dotted, f"given next to {target}, give one of the two")
-        spoken.bad.add(_two_parts(dotted, target))
-        return {}
-    texts = list(value) if isinstance(value, list | tuple) else [value]
-    if not all(isinstance(one, str) for one in texts):
+    elif not all(isinstance(one, str) for one in texts):
         spoken.refuse(
             dotted, f"{value!r} has no unit; write it with its unit, in quotes, or as {target}"
         )
     else:
         try:
             numbers = [converted(one, suffix_of(target)) for one in texts]
+            return {target: numbers if isinstance(value, list | tuple) else numbers[0]}
         except ValueError as error:
             spoken.refuse(dotted, f"{value!r}: {error}")
-        else:
-            spoken.given[dotted] = ", ".join(texts)
-            return {target: numbers if isinstance(value, list | tuple) else numbers[0]}
-    spoken.bad.add(_two_parts(dotted, target))
+    spoken.bad.add(".".join([*dotted.split(".")[:-1], target][:2]))
     return {}
 
 
-def _two_parts(dotted: str, target: str) -> str:
-    """The key `target` next to `dotted`, by at most its first two parts."""
-    return ".".join([*dotted.split(".")[:-1], target][:2])
-
-
-def _curve(
-    spoken: Spoken, dotted: str, value: Any, table: Mapping[str, Any], folder: Path
-) -> dict[str, Any]:
+def _curve(spoken: Spoken, dotted: str, value: Any, table: Mapping[str, Any]) -> dict[str, Any]:
     """The points of the file that a table of sizes names."""
     others = [key for key in table if stem_of(key) in ("size", "passing", "D10", "D50", "D90")]
     if not isinstance(value, str):
@@ -371,36 +338,11 @@ def _curve(
         spoken.refuse(dotted, f"given next to {others[0]}, give one of the two")
     else:
         try:
-            size, passing = read_size_file(folder, value, by=str(table.get("by", "mass")))
+            size, passing = read_size_file(spoken.folder, value, by=str(table.get("by", "mass")))
+            return {"size_mm": size, "passing_percent": passing}
         except ValueError as error:
             spoken.refuse(dotted, str(error))
-        else:
-            spoken.given[dotted] = value
-            return {"size_mm": size, "passing_percent": passing}
     return {}
-
-
-def _holds(key: Any, text: Any, data: Mapping[str, Any]) -> bool:
-    """Whether what was once given still is what the tables hold."""
-    *names, last = str(key).split(".")
-    table: Any = data
-    for name in names:
-        if isinstance(table, list) and name.isdecimal():
-            table = dict(enumerate(table)).get(int(name[:9]))
-        else:
-            table = table.get(name) if isinstance(table, Mapping) else None
-    if not isinstance(table, Mapping) or not isinstance(text, str):
-        return False
-    if last == FILE:
-        return "size_mm" in table
-    try:
-        if last in table:
-            return bool(table[last] == share_of(text))
-        targets = [f"{last}{suffix}" for suffix in SUFFIXES if f"{last}{suffix}" in table]
-        numbers = [converted(one, suffix_of(targets[0])) for one in text.split(", ")]
-        return table[targets[0]] in (numbers, numbers[0])
-    except (ValueError, IndexError):
-        return False
 
 
 # ------------------------------------------------------------------------------------------------
@@ -544,45 +486,38 @@ def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
 
     Values are read as TOML, bare words as text. Raises CaseError for a malformed assignment.
     """
-    result = copy.deepcopy(data)
     for assignment in assignments:
         key, equals, text = assignment.partition("=")
         names = key.strip().split(".")
-        if len(names) > _MOST_NAMES:
+        if not equals or not all(names) or len(names) > _MOST_NAMES:
             raise CaseError(
-                f"--set {assignment[:60]}...: the key has {len(names)} parts, expected at most "
-                f"{_MOST_NAMES}, e.g. fines.radius_mm=0.05"
-            )
-        if not equals or not all(names):
-            raise CaseError(
-                f"--set {assignment}: expected key=value with a dotted key, "
+                f"--set {assignment[:60]}: expected key=value with a dotted key, "
                 "e.g. fines.radius_mm=0.05"
             )
-        _put(result, names, _toml_value(text.strip()), f"--set {assignment}")
-    return result
+        data = put_keys(data, {key.strip(): _toml_value(text.strip())}, source="--set ")
+    return data
 
 
-def put_keys(data: dict[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """`data` with the `values` of dotted keys put in, as `set_keys` does with texts.
+def put_keys(
+    data: dict[str, Any], values: Mapping[str, Any], *, source: str = ""
+) -> dict[str, Any]:
+    """`data` with the `values` of dotted keys put in; `source` begins messages.
 
-    Raises CaseError where a key lies in something that is no table.
+    The same key with another unit, or without one, goes away. Raises CaseError where a key lies in
+    something that is no table.
     """
     result = copy.deepcopy(data)
     for key, value in values.items():
-        _put(result, key.split("."), value, f"{key} = {value!r}")
+        *names, last = key.split(".")
+        table = result
+        for name in names:
+            table = table.setdefault(name, {})
+            if not isinstance(table, dict):
+                raise CaseError(f"{source}{key} = {value!r}: {name} is a value, not a table")
+        for other in [name for name in table if stem_of(name) == stem_of(last)]:
+            del table[other]
+        table[last] = value
     return result
-
-
-def _put(data: dict[str, Any], names: list[str], value: Any, source: str) -> None:
-    """Put one key in; the same key with another unit, or without one, goes away."""
-    table = data
-    for name in names[:-1]:
-        table = table.setdefault(name, {})
-        if not isinstance(table, dict):
-            raise CaseError(f"{source}: {name} is a value, not a table")
-    for other in [name for name in table if stem_of(name) == stem_of(names[-1])]:
-        del table[other]
-    table[names[-1]] = value
 
 
 def _toml_value(text: str) -> Any:
@@ -626,7 +561,9 @@ def read_case(
 
 def recorded_case(path: Path) -> Case:
     """The case that a run folder holds. Raises CaseError as `read_case` does."""
-    return case_from(toml_tables(path), source=str(path), folder=path.parent)
+    data = toml_tables(path)
+    data.pop("given", None)  # texts for the same values, in runs of before
+    return case_from(data, source=str(path))
 
 
 def toml_tables(path: str | Path, what: str = "a case file") -> dict[str, Any]:
@@ -650,21 +587,14 @@ def toml_tables(path: str | Path, what: str = "a case file") -> dict[str, Any]:
 
 
 QUICK = "quick-"
-_SENTENCE = re.compile(r"(.+?)[.:](\s|$)")
 
 
 class ShippedCase(NamedTuple):
-    """A case file that comes with fdnet.
+    """A case file that comes with fdnet."""
 
-    Attributes:
-        name: as `fdnet init --from` takes it; "quick-NAME" is the quick form of NAME.
-        path: of the file.
-        about: the first sentence of its comment.
-    """
-
-    name: str
-    path: Path
-    about: str
+    name: str  # as `fdnet init --from` takes it; "quick-NAME" is the quick form of NAME
+    path: Path  # of the file
+    about: str  # the first sentence of its comment
 
 
 def cases_folder() -> Path:
@@ -697,11 +627,6 @@ def shipped_cases() -> tuple[ShippedCase, ...]:
 
 def first_sentence(text: str) -> str:
     """The first sentence of the comment at the top of a file, without its full stop."""
-    lines = []
-    for line in text.splitlines():
-        if not line.startswith("#"):
-            break
-        lines.append(line.lstrip("# "))
-    comment = " ".join(lines)
-    match = _SENTENCE.match(comment)
-    return match[1] if match else comment
+    comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    joined = " ".join(line.lstrip("# ") for line in comment)
+    return re.split(r"[.:](?:\s|$)", joined, maxsplit=1)[0]

@@ -65,20 +65,19 @@ class Sizes(Part):
     D90_mm: Positive | None = None
     """Diameter that 90 % are finer than."""
     shape: Literal["log-normal", "rosin-rammler"] | None = None
-    """Law through the diameters. When absent: the one that misses them least, "log-normal" for
-    two."""
+    """Law through the diameters. When absent: that which fits best, "log-normal" for two."""
     size_mm: Lengths | None = None
-    """Diameters of a measured curve, rising; it is straight over ln d."""
+    """Diameters of a measured curve, rising."""
     passing_percent: Percents | None = None
     """What is finer than each of `size_mm`, rising to 100."""
     by: Literal["mass", "volume", "surface", "number"] = "mass"
-    """What the percentages count. Mass and volume are the same for one material."""
+    """What the percentages count."""
     cut_percent: Cut = (1.0, 99.0)
-    """Ends of the curve, by volume: finer and coarser sizes are left out."""
+    """Ends of the curve by volume; what is finer and coarser is left out."""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
-        for problem in _problems(self):
+        if problem := _problem(self):
             raise PydanticCustomError("size_curve", "{problem}", {"problem": problem})
         return self
 
@@ -104,10 +103,8 @@ class Sizes(Part):
         """The law of the whole, by `by`."""
         if self.fit is not None:
             return self.fit.law
-        assert self.size_mm is not None
-        assert self.passing_percent is not None
-        finer = [one / 100 for one in self.passing_percent]
-        return Points(tuple(one * 1e-3 for one in self.size_mm), (*finer[:-1], 1.0))
+        finer, size = zip(*self.points, strict=True)
+        return Points(size, (*finer[:-1], 1.0))
 
     def curve(self, finest: float = 0.0) -> SizeCurve:
         """The curve between its cuts, m; nothing finer than `finest` m."""
@@ -116,83 +113,68 @@ class Sizes(Part):
         return cut_curve(self.law, by=_POWERS[self.by], cut=cut, finest=finest)
 
 
-def _problems(sizes: Sizes) -> Iterator[str]:
-    given, cut = sizes.asked, sizes.cut_percent
+def _problem(sizes: Sizes) -> str:
+    """The first problem of a curve, or ""."""
+    given, (low, high) = sizes.asked, sizes.cut_percent
     measured = sizes.size_mm is not None or sizes.passing_percent is not None
-    if measured and given:
-        yield "gives D10, D50 or D90 beside a measured curve; give one of the two"
-    elif measured:
-        yield from _measured_problem(sizes)
-    elif len(given) < 2:
-        yield (
+    if low >= high:
+        return f"cut_percent [{low}, {high}] must rise, [finest, coarsest]"
+    if measured:
+        beside = "gives D10, D50 or D90 beside a measured curve; give one of the two"
+        return beside if given else _measured_problem(sizes)
+    if len(given) < 2:
+        return (
             f"gives {len(given)} of D10, D50 and D90, expected two or three of them (one diameter "
             "has no spread), or size and passing of a measured curve, or a file"
         )
-    elif not all(LEAST_RATIO <= b / a <= MOST_RATIO for a, b in pairwise(given.values())):
+    if not all(LEAST_RATIO <= b / a <= MOST_RATIO for a, b in pairwise(given.values())):
         texts = ", ".join(f"D{100 * share:.0f} {1e3 * size:g} mm" for share, size in given.items())
-        yield (
+        return (
             f"{texts}: must rise from D10 to D90, each {LEAST_RATIO} to {MOST_RATIO:g} times the "
             "one before"
         )
-    if cut[0] >= cut[1]:
-        yield f"cut_percent {list(cut)} must rise, [finest, coarsest]"
-    elif not measured and not 0 < cut[0] < cut[1] < 100:
-        yield (
-            f"cut_percent {list(cut)}: the law of D10, D50 and D90 has no ends, "
+    if not 0 < low < high < 100:
+        return (
+            f"cut_percent [{low}, {high}]: the law of D10, D50 and D90 has no ends, "
             "expected cuts above 0 and below 100"
         )
+    return ""
 
 
-def _measured_problem(sizes: Sizes) -> Iterator[str]:
-    """The first problem of a measured curve."""
+def _measured_problem(sizes: Sizes) -> str:
+    """The first problem of a measured curve, or ""."""
     size, finer = sizes.size_mm, sizes.passing_percent
     if size is None or finer is None:
-        yield "a measured curve needs both size_mm and passing_percent"
-        return
+        return "a measured curve needs both size_mm and passing_percent"
     if len(size) != len(finer):
-        yield f"{len(size)} sizes with {len(finer)} percentages, expected as many of both"
-        return
+        return f"{len(size)} sizes with {len(finer)} percentages, expected as many of both"
     if sizes.shape is not None:
-        yield f"shape {sizes.shape!r} belongs to D10, D50 and D90, not to a measured curve"
-        return
+        return f"shape {sizes.shape!r} belongs to D10, D50 and D90, not to a measured curve"
     if finer[0] > 0 and sizes.by in ("number", "surface"):
-        yield (
+        return (
             f"the curve by {sizes.by} begins at {finer[0]:g} %, expected 0 %: spheres of unknown "
             "size have no volume"
         )
-        return
     for (a, b), (p, q) in zip(pairwise(size), pairwise(finer), strict=True):
         if b < (1 + _ROUNDING) * a:
-            yield f"size_mm must rise, but {b:g} mm follows {a:g} mm"
-            return
+            return f"size_mm must rise, but {b:g} mm follows {a:g} mm"
         if p > q:
-            yield (
+            return (
                 f"the curve must not fall: {p:g} % pass {a:g} mm, but {q:g} % pass {b:g} mm; "
                 "are these percentages of each fraction, or retained?"
             )
-            return
-    if abs(finer[-1] - 100) > 100 * _ROUNDING:
-        yield (
-            f"the curve ends at {finer[-1]:g} % at {size[-1]:g} mm, expected 100 %: add the size "
-            "that all passes"
-        )
+    ends = abs(finer[-1] - 100) <= 100 * _ROUNDING
+    return "" if ends else f"the curve ends at {finer[-1]:g} % at {size[-1]:g} mm, expected 100 %"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solid:
-    """One material of some spheres.
+    """One material of some spheres."""
 
-    Attributes:
-        name: as the case gives it; empty where there is one material.
-        share: of the volume of all solids of the case.
-        curve: diameters, m.
-        density: kg/m3.
-    """
-
-    name: str
-    share: float
-    curve: SizeCurve
-    density: float
+    name: str  # as the case gives it; empty where there is one material
+    share: float  # of the volume of all solids of the case
+    curve: SizeCurve  # diameters, m
+    density: float  # kg/m3
 
 
 class Material(Part):
@@ -201,13 +183,11 @@ class Material(Part):
     name: str = Field(min_length=1, max_length=60)
     """Name of the material."""
     share: Positive
-    """Its share of the solids by mass, relative to the sum of shares."""
+    """Its share of the solids by mass, over the sum of shares."""
     sizes: Sizes
-    """Its curve of diameters, as `fines.sizes`."""
+    """As `fines.sizes`."""
     density_kg_m3: Positive | None = None
-    """Density of the material. When absent: `fines.density_kg_m3`."""
-    friction: NonNegative | None = None
-    """Must be `fines.friction`, which is the default."""
+    """Its density. When absent: `fines.density_kg_m3`."""
 
 
 SHEAR_RATIO = 0.04
@@ -219,26 +199,23 @@ class Spheres(Part):
     """What grains and fines share: sizes, density and the parameters of their contacts."""
 
     radius_mm: Radius | None = None
-    """Radius. A list [smallest, largest] gives radii uniform by number. Give this or `sizes`."""
+    """Radius, or [smallest, largest] of radii uniform by number."""
     sizes: Sizes | None = None
-    """A measured curve of diameters instead; its keys are below."""
+    """A curve of diameters instead."""
     density_kg_m3: Positive
     """Density of the solid."""
     normal_stiffness_N_m: Positive
-    """Normal contact stiffness of the material. Two spheres in contact act as two springs in
-    series. `run.stiffness_N_m` scales all contact stiffnesses by one factor."""
+    """Normal contact stiffness of the material; two in contact are springs in series."""
     shear_stiffness_N_m: Positive | None = None
-    """Tangential contact stiffness of the material, scaled like the normal one. When absent: 0.04
-    of the normal one, so that friction lets go of fines that roll around the neck of two grains.
-    """
+    """Tangential contact stiffness of the material; see `SHEAR_RATIO`."""
     youngs_modulus_GPa: Positive
-    """Young's modulus of the material, for contact.model = "hertz"."""
+    """Young's modulus, for "hertz"."""
     poissons_ratio: Annotated[float, Field(ge=0, le=0.5)]
-    """Poisson's ratio of the material, for contact.model = "hertz"."""
+    """Poisson's ratio, for "hertz"."""
     friction: NonNegative = 0.55
-    """Sliding friction. A contact takes the smaller value of its two materials."""
+    """Sliding friction; a contact takes the smaller of two."""
     damping_ratio: Annotated[float, Field(ge=0, lt=1)] = 0.2
-    """Damping over critical damping. A contact takes the mean of its two materials."""
+    """Damping over critical damping; a contact takes the mean of two."""
 
     @property
     def tangential_stiffness(self) -> float:
@@ -247,7 +224,6 @@ class Spheres(Part):
         return SHEAR_RATIO * self.normal_stiffness_N_m if given is None else given
 
     youngs_modulus_Pa: ClassVar = InSI[float]("youngs_modulus_GPa", 1e9)
-    """Young's modulus of the material, Pa."""
 
     @cached_property
     def components(self) -> tuple[Solid, ...]:
@@ -362,32 +338,25 @@ class Grains(Spheres):
     """
 
     porosity: Fraction | None = None
-    """Porosity of the pack, overlaps counted once. The number of grains is adjusted until it is
-    met within 0.003."""
+    """Porosity of the pack within 0.003, overlaps counted once."""
     count: Annotated[int, Field(ge=1)] | None = None
-    """Number of grains. It overrides `porosity`."""
+    """Number of grains, instead of `porosity`."""
     density_kg_m3: Positive = 2650.0
     """Density of the grains."""
     normal_stiffness_N_m: Positive = 94.3e9
-    """Normal contact stiffness of grains and walls. `run.stiffness_N_m` scales all by one
-    factor."""
+    """Normal contact stiffness of grains and walls; `run.stiffness_N_m` scales all alike."""
     shear_stiffness_N_m: Positive | None = None
-    """Tangential one. When absent: 0.04 of the normal one, so that fines do not lock between
-    grains. The thesis has 34e9."""
+    """Tangential one. When absent: 0.04 of the normal one, so that no fine locks in."""
     youngs_modulus_GPa: Positive = 94.3
-    """Young's modulus of grains and walls, for "hertz" (quartz). `run.stiffness_N_m` scales all by
-    one factor."""
+    """Young's modulus of grains and walls, for "hertz" (quartz)."""
     poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.387
     """Poisson's ratio of grains and walls, for "hertz"."""
     motion: Literal["fixed", "mobile"] = "fixed"
-    """"fixed" grains stay in place during the invasion, "mobile" ones are pushed by fines, not by
-    the fluid."""
+    """"fixed" grains stay during the invasion, "mobile" ones are pushed by fines."""
     max_overlap: Fraction = 0.15
-    """Largest accepted overlap of two grains, over the smaller diameter; a denser pack is
-    refused."""
+    """Overlap of two grains, over the smaller diameter, above which a pack is refused."""
     packing_stiffness_N_m: Positive = 1.0e4
-    """Stiffness of the stiffest contact while the pack is made, whatever `run.stiffness_N_m` is.
-    With another value the same seed gives another pack of the same kind."""
+    """Stiffness of the stiffest contact while the pack is made; another one makes another pack."""
 
 
 class Fines(Spheres):
@@ -403,33 +372,29 @@ class Fines(Spheres):
     normal_stiffness_N_m: Positive = 63.0e9
     """Normal contact stiffness."""
     shear_stiffness_N_m: Positive | None = None
-    """Tangential one. When absent: 0.04 of the normal one. The thesis has 26e9."""
+    """Tangential one. When absent: 0.04 of the normal one."""
     youngs_modulus_GPa: Positive = 63.0
     """Young's modulus, for "hertz"."""
     poissons_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.212
     """Poisson's ratio, for "hertz"."""
     materials: Materials | None = None
-    """Several materials instead; their keys are below."""
+    """Several materials instead."""
     cut_um: Positive | None = None
-    """Diameter below which solids of measured sizes are no spheres. They are size classes with
-    invasion.method = "both", else they are left out: the mud is thinner by their share, which a
-    warning names."""
+    """Diameter of measured sizes below which solids are no spheres: they are size classes with
+    invasion.method = "both", else left out, which a warning names."""
     concentration: Annotated[float, Field(gt=0, le=MAX_CONCENTRATION)] | None = 0.10
     """Volume of solids over that of the mud."""
     solids_kg_m3: Positive | None = None
-    """Mass of solids in a volume of mud, instead of `concentration`."""
+    """Mass of solids over volume of mud, instead of `concentration`."""
     count: Annotated[int, Field(ge=1)] | None = None
-    """Number of fines supplied. When absent, and `slab_mm` too, mud comes until the stop rule, but
-    at most ten times what plugged the shipped cases, or two pore volumes of fines that pass."""
+    """Number of fines. When absent, without `slab_mm`, mud comes until the stop rule, at most ten
+    times what plugged the shipped cases, or two pore volumes of fines that pass."""
     slab_mm: Positive | None = None
     """Length of the slab of mud, instead of `count`."""
     supply: Literal["slab", "batches"] = "batches"
-    """How the fines enter: "batches" puts each part of the slab in when it is about to arrive,
-    "slab" puts all of them in at the start. The suspension is the same; batches are much faster
-    for a long slab."""
+    """Whether fines are put in as they arrive, which is faster, or all at the start ("slab")."""
 
     slab_m: ClassVar = InSI[float | None]("slab_mm", 1e-3)
-    """Length of the slab of suspension, m; None: it follows from the count."""
 
     @model_validator(mode="before")
     @classmethod

@@ -41,9 +41,6 @@ MAX_CONCENTRATION = 0.30
 MOST_GRAINS, MOST_FINES, MOST_SLAB, MOST_BINS = 10_000_000, 10_000_000, 1000, 10_000
 """Upper bounds: grains, fines, slab over box length, profile bins."""
 
-LEAST_SKIN, MOST_NEIGHBOUR_BINS = 0.01, 10_000_000
-"""Smallest skin over the smallest fine's radius, most bins of the neighbour search in the box."""
-
 CONTACT_STEP_LIMIT = 0.3
 """Largest time step over sqrt(m/k).
 
@@ -108,21 +105,18 @@ class Fluid(Part):
     viscosity_cP: Positive = 50.0
     """Dynamic viscosity."""
     density_kg_m3: Positive = 1095.0
-    """Density; it decides buoyancy and the particle Reynolds number."""
+    """Its density."""
     overbalance_MPa: Positive = 3.5
-    """Pressure of the mud above that of the formation; it drives the fluid by Darcy's law."""
+    """Pressure of the mud above that of the formation."""
     velocity_m_s: Positive | None = None
-    """Interstitial velocity along x. When absent it follows from the overbalance and `[well]` or
-    `darcy_length_mm`."""
+    """Velocity in the pores. When absent: by the overbalance and `[well]` or `darcy_length_mm`."""
     darcy_length_mm: Positive | None = None
-    """Length of a plug over which the whole overbalance is lost. When absent, without a well: the
-    length of the box, which warns."""
+    """Length of a plug that takes the whole overbalance. When absent, without a well: the length
+    of the box, which warns."""
     darcy_law: Literal["ergun", "darcy"] = "ergun"
-    """The overbalance makes the velocity with the loss by inertia ("ergun"), or by the viscous
-    loss alone ("darcy"), which warns where inertia takes 5 % or more."""
+    """Whether inertia takes its share of the overbalance ("ergun"), or not ("darcy")."""
 
     viscosity_Pa_s: ClassVar = InSI[float]("viscosity_cP", 1e-3)
-    """Dynamic viscosity, Pa s."""
 
     @property
     def stokes_coefficient_Pa_s(self) -> float:
@@ -130,9 +124,7 @@ class Fluid(Part):
         return 6 * math.pi * self.viscosity_cP * 1e-3
 
     darcy_length_m: ClassVar = InSI[float | None]("darcy_length_mm", 1e-3)
-    """Length over which the overbalance is lost, m; None: the length of the box."""
     overbalance_Pa: ClassVar = InSI[float]("overbalance_MPa", 1e6)
-    """Pressure of the mud above that of the formation, Pa."""
 
 
 class Well(Part):
@@ -144,18 +136,14 @@ class Well(Part):
     radius_mm: Positive
     """Radius of the well, to the formation face."""
     drainage_radius_m: Positive = 100.0
-    """Radius at which the pressure is that of the undisturbed formation; 100 m is a well on 3 ha.
-    It counts by its logarithm: half or twice of it moves the velocity by 10 %."""
+    """Radius of the undisturbed formation; half or twice of it moves the velocity by 10 %."""
     formation_permeability_mD: Positive | None = None
-    """Permeability of the formation. When absent: that of the pack by Carman and Kozeny, by the
-    network where the flow follows the deposit."""
+    """Permeability of the formation. When absent: that of the pack."""
 
     radius_m: ClassVar = InSI[float]("radius_mm", 1e-3)
-    """Radius of the well, m."""
     formation_permeability_m2: ClassVar = InSI[float | None](
         "formation_permeability_mD", M2_PER_MD
     )
-    """Permeability of the formation, m2; None: that of the pack."""
 
 
 MODEL_KEYS = {
@@ -174,13 +162,13 @@ class ContactLaw(Part):
     """"hooke": linear springs. "hertz": Hertz-Mindlin contacts of the moduli."""
 
     restitution: Literal["liquid", "dry"] = "liquid"
-    """Rebound of fines: "liquid" lowers the restitution by exp(-35 / St), St being the impact
-    Stokes number; "dry" takes `damping_ratio` as it is."""
+    """Rebound of fines: by exp(-35 / St) lower in a "liquid", St being the impact Stokes number;
+    "dry" as `damping_ratio` has it."""
     rolling_friction: Positive | None = None
-    """Largest rolling torque of a contact over normal force and effective radius. When absent
-    nothing resists rolling."""
+    """Largest rolling torque over normal force and effective radius. When absent nothing resists
+    rolling."""
     cohesion_J_m3: Positive | None = None
-    """Attraction of a fine's contact over its area (LIGGGHTS's SJKR). It needs "hertz". When
+    """Attraction over the area of a fine's contact (LIGGGHTS's SJKR); it needs "hertz". When
     absent nothing attracts."""
 
     @property
@@ -202,21 +190,17 @@ class Bonds(Part):
     shear_stiffness_GPa_m: Positive = 40.0
     """Shear stiffness of a bond per area of its disc."""
     tensile_strength_MPa: Positive | None = None
-    """Largest tensile stress of a bond. When absent, bonds never break; give it together with the
-    shear strength."""
+    """Largest tensile stress of a bond. When absent, with the shear strength, bonds never
+    break."""
     shear_strength_MPa: Positive | None = None
-    """Largest shear stress of a bond; see the tensile strength."""
+    """Largest shear stress of a bond."""
     gap_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.01
     """Widest gap that a bond bridges, over the smaller diameter of its two grains."""
 
     normal_stiffness_Pa_m: ClassVar = InSI[float]("normal_stiffness_GPa_m", 1e9)
-    """Normal stiffness per area, Pa/m."""
     shear_stiffness_Pa_m: ClassVar = InSI[float]("shear_stiffness_GPa_m", 1e9)
-    """Shear stiffness per area, Pa/m."""
     tensile_strength_Pa: ClassVar = InSI[float | None]("tensile_strength_MPa", 1e6)
-    """Tensile strength, Pa; None: bonds never break."""
     shear_strength_Pa: ClassVar = InSI[float | None]("shear_strength_MPa", 1e6)
-    """Shear strength, Pa; None: bonds never break."""
 
 
 FLOW_TRAVEL, MOST_TRAVEL = 1.0, 10.0
@@ -234,30 +218,15 @@ class Box(Part):
     size_mm: Triple
     """Three side lengths; the mud flows along the first."""
     sides: Literal["walls", "periodic"] = "periodic"
-    """What bounds the box in y and z: "periodic" images of itself, or solid "walls"."""
+    """What bounds the box in y and z: "periodic" images of itself, or "walls"."""
     wall_friction: NonNegative | None = None
-    """Sliding friction of side walls. When absent: that of the grains. A contact takes the smaller
-    value of wall and sphere."""
-
-    @property
-    def size_m(self) -> tuple[float, float, float]:
-        """Side lengths (x, y, z), m."""
-        x, y, z = self.size_mm
-        return x * 1e-3, y * 1e-3, z * 1e-3
-
-    @property
-    def periodic(self) -> tuple[bool, bool, bool]:
-        """Which directions are periodic; the flow direction never is."""
-        sideways = self.sides == "periodic"
-        return False, sideways, sideways
+    """Sliding friction of side walls. When absent: that of the grains."""
 
 
 class Drag(Part):
-    """[drag], the forces of the fluid on every fine.
+    """[drag], the forces of the fluid on every fine: drag by its slip, and the pressure gradient.
 
-    Drag by its slip, and that of the pressure gradient. Where the fluid follows the deposit the
-    drag is that of Beetstra and others (2007), with the porosity and the Reynolds number around
-    each fine.
+    Where the fluid follows the deposit, drag is that of Beetstra and others (2007).
     """
 
     field: Literal["network", "uniform"] = "network"
@@ -267,38 +236,34 @@ class Drag(Part):
     """Factor on the drag."""
     scheme: Literal["implicit", "held", "viscous"] = Field(
         "implicit",
-        description='With the field "uniform": "held" (when absent) keeps the force for '
-        '`refresh_steps` steps, "viscous" takes viscous damping (fines of one size), "implicit" '
-        'is stable at any step, and is what the field "network" takes.',
+        description='How forces act with the field "uniform": "held" (when absent) for '
+        '`refresh_steps` steps, "viscous" as damping (fines of one size), "implicit" at any step.',
     )
     refresh_steps: Annotated[int, Field(ge=1)] | None = None
-    """Steps for which "held" keeps the force. When absent: at most 0.05 of the relaxation time."""
+    """Steps for which "held" keeps a force. When absent: 0.05 of the relaxation time at most."""
     drive_velocity_m_s: Positive | Literal["auto", "fluid"] = Field(
         "auto",
-        description="Velocity in the pores of the simulation, to shorten a run with a weak push. "
-        "All forces are scaled by the same factor. Allowed up to an impact Stokes number of 1; "
-        '"auto" (when absent with the field "network") drives to 0.1, but never slower than the '
-        'fluid moves and not with cohesion; "fluid" (when absent with "uniform") is its own.',
+        description="Velocity in the simulated pores, to shorten a run with a weak push; all "
+        'forces are scaled alike. "fluid" (when absent with "uniform"): its own. "auto": up '
+        "to an impact Stokes number of 0.1, not with cohesion. A number: up to 1.",
     )
     upstream: Literal["darcy", "interstitial"] = "darcy"
-    """Velocity upstream of the face: "darcy", or, with the field "uniform", "interstitial" as in
-    the pack, which brings the mud too fast."""
+    """Velocity upstream of the face; "interstitial", that in the pores, brings the mud too
+    fast."""
     pressure_gradient: bool = True
-    """Whether the pressure gradient pushes the fines inside the pack. Only the field "uniform" can
-    leave it out; the thesis's cases do."""
+    """Whether the pressure gradient pushes the fines; only the field "uniform" can leave it
+    out."""
     inertia: Literal["schiller-naumann", "none"] = Field(
         "schiller-naumann",
-        description='With the field "uniform" and the scheme "held": drag times '
-        '1 + 0.15 Re^0.687 (Re up to 800; when absent), or "none", Stokes drag at any speed, as '
-        "with the other schemes.",
+        description='Drag times 1 + 0.15 Re^0.687 (with "held"; Re up to 800), or "none": Stokes '
+        "drag at any speed.",
     )
     drive: Literal["pressure", "rate"] | None = None
     """What stays constant with the field "network": "pressure" (when absent) or "rate"."""
     update_travel: Annotated[float, Field(gt=0, le=MOST_TRAVEL)] | None = Field(
         None,
-        description="How far the fluid carries a fine, in diameters of the smallest fine, before "
-        'the forces on all fines are computed anew with the field "network". When absent: '
-        f"{FLOW_TRAVEL:g}.",
+        description="Way of the fluid, in diameters of the smallest fine, after which the field "
+        f'"network" is computed anew. When absent: {FLOW_TRAVEL:g}.',
     )
 
     @model_validator(mode="before")
@@ -336,13 +301,13 @@ class Gravity(Part):
     """[gravity], weight and buoyancy of the moving spheres."""
 
     mode: Literal["auto", "on", "off"] = "auto"
-    """"auto" leaves gravity out where weight over drag is below `negligible_below`."""
+    """"auto" leaves gravity out below `negligible_below`."""
     acceleration_m_s2: Vector = (0.0, 0.0, -9.81)
-    """Gravity vector (x, y, z), in any direction."""
+    """Gravity vector (x, y, z)."""
     buoyancy: bool = True
-    """Whether the fluid's buoyancy acts on fines and mobile grains."""
+    """Whether buoyancy acts on what moves."""
     negligible_below: NonNegative = 1e-3
-    """Ratio of weight to drag below which mode "auto" leaves gravity out."""
+    """Weight over drag that is negligible."""
 
 
 DEFAULT_STIFFNESS = 1.0e4
@@ -358,100 +323,55 @@ class Run(Part):
     """
 
     stiffness_N_m: Positive | Literal["nominal", "auto"] = "auto"
-    """Stiffness of the stiffest contact; all others keep their ratio to it. With "hertz": force
-    over overlap of a fine's stiffest contact at 1 % of its diameter. "nominal" keeps the real
-    stiffness. "auto" takes the least that keeps predicted overlaps at 3 %: in the uniform field at
-    least the default; where the flow follows the deposit, a fifth of what its largest forces
-    need, raised at a checkpoint when the overlaps that are seen ask for it."""
+    """Stiffness of the stiffest contact (with "hertz" at an overlap of 1 %); the others keep their
+    ratio to it. "nominal": that of the materials. "auto": the least that keeps predicted overlaps
+    at 3 %, in the uniform field at least 1e4; where the flow follows the deposit it starts at a
+    fifth of that and rises with the overlaps that are seen."""
     max_hours: Positive = 24.0
-    """A case that is expected to run longer is refused before it starts."""
+    """A case that is expected to run longer is refused."""
     max_overlap: Fraction = 0.05
-    """Overlap of a fine, over the smaller diameter, above which `on_overlap` applies. Springs by
-    "auto" aim at 3 %, and few fines are pressed in deeper."""
+    """Overlap of a fine, over the smaller diameter, above which `on_overlap` applies."""
     on_overlap: Literal["warn", "stop"] = "warn"
-    """What follows then: a warning ("warn"), or the run stops with its state kept ("stop")."""
+    """Then the run warns, or stops with its state kept ("stop")."""
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] | None = None
-    """Time step over sqrt(m/k) of the lightest sphere and stiffest contact. Up to 0.3 is stable
-    for linear contacts without rolling friction and with damping ratios up to 0.48; all others
-    take at most 0.2. When absent: 0.2; where springs grow with the load (stiffness "auto", field
-    "network") the largest that is stable, or less, down to 0.1, so that small fines do not lock
-    between grains."""
+    """Time step over sqrt(m/k) of the lightest sphere and stiffest contact; above 0.2 for linear
+    contacts without rolling friction and with damping ratios up to 0.48 alone. When absent: 0.2;
+    where springs grow with the load, 0.1 to 0.3 as stability and small fines ask for."""
     time_step_s: Positive | None = None
     """Time step of the invasion, instead of `time_step_factor`."""
     duration_ms: Positive | None = None
-    """Length of the invasion. It replaces the stop rule and excludes `cap_ms`."""
+    """Length of the invasion, instead of the stop rule."""
     plug_time_ms: Positive | None = None
-    """The face counts as plugged when no fine crossed it for this time. When absent: until the
-    fluid has passed four grain diameters and ten fines have arrived."""
+    """The face is plugged when no fine crossed it for this time. When absent: until the fluid has
+    passed four grains and ten fines have arrived."""
     plug_rate: Annotated[float, Field(ge=0, lt=1)] = 0.05
-    """Share of the undisturbed supply that may still cross the face while it counts as plugged."""
+    """Share of the undisturbed supply that may still cross a plugged face."""
     stop_rate: Fraction | None = None
-    """Share of the first rate below which the invasion ends as plugged (field "network")."""
+    """Share of the first rate below which the face is plugged (field "network")."""
     stop_pore_volumes: Positive | None = None
-    """The invasion ends when so many volumes of its intact pores have passed (field "network")."""
+    """Volumes of the intact pores after which the invasion ends (field "network")."""
     cap_ms: Positive | None = None
-    """The invasion ends at this time at the latest. When absent it follows from slab, plug time
-    and velocity."""
+    """Longest invasion. When absent: by slab, plug time and velocity."""
     checkpoint_ms: Positive | None = None
     """Time between checkpoints. When absent: the fluid passes about one grain diameter."""
-    skin_mm: Positive | None = None
-    """Skin of LIGGGHTS's neighbour search. When absent: 0.3 of the radius of the smallest fine;
-    with the field "uniform" the radius."""
-    neighbour_bin_mm: Positive | None = None
-    """Bin width of LIGGGHTS's neighbour search. When absent LIGGGHTS chooses it."""
 
     duration_s: ClassVar = InSI[float | None]("duration_ms", 1e-3)
-    """Length of the invasion, s; None: until the stop rule holds."""
     plug_time_s: ClassVar = InSI[float | None]("plug_time_ms", 1e-3)
-    """Time without a crossing after which the face counts as plugged, s, if given."""
     cap_s: ClassVar = InSI[float | None]("cap_ms", 1e-3)
-    """Time at which the invasion ends at the latest, s, if given."""
     checkpoint_s: ClassVar = InSI[float | None]("checkpoint_ms", 1e-3)
-    """Time between checkpoints, s, if given."""
-    skin_m: ClassVar = InSI[float | None]("skin_mm", 1e-3)
-    """Skin of the neighbour search, m, if given."""
-    neighbour_bin_m: ClassVar = InSI[float | None]("neighbour_bin_mm", 1e-3)
-    """Bin width of the neighbour search, m, if given."""
 
 
 class CleanUp(Part):
-    """[clean_up], production after the invasion.
-
-    The flow is turned back, from the formation to the well.
-
-    Friction, rolling resistance and cohesion are those of the invasion.
-    """
+    """[clean_up], production after the invasion: the flow is turned back, at the drawdown."""
 
     drawdown_MPa: Positive
-    """Pressure of the formation above that of the well, lost on the same way as the
-    overbalance."""
+    """Pressure of the formation above that of the well, lost on the way of the overbalance."""
     duration_ms: Positive | None = None
-    """Length of the clean-up. It replaces the stop rule and excludes `cap_ms`."""
-    quiet_ms: Positive | None = None
-    """The clean-up ends when no fine has come out for this time. When absent: the time in which
-    the fluid passes the specimen once."""
-    cap_ms: Positive | None = None
-    """The clean-up ends at this time at the latest. When absent: twenty times the time in which
-    the fluid passes the specimen."""
+    """Length of the clean-up. When absent it ends when no fine comes out while the fluid passes
+    the specimen once, at the latest after twenty passages."""
 
     drawdown_Pa: ClassVar = InSI[float]("drawdown_MPa", 1e6)
-    """Pressure of the formation above that of the well, Pa."""
-
-    def fluid_of(self, fluid: Fluid) -> Fluid:
-        """The fluid with the drawdown for its overbalance."""
-        return fluid.model_copy(update={"overbalance_MPa": self.drawdown_MPa})
-
-    def run_of(self, run: Run) -> Run:
-        """The control of the invasion with the length of the clean-up."""
-        own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
-        return run.model_copy(update=own | {"duration_ms": self.duration_ms})
-
     duration_s: ClassVar = InSI[float | None]("duration_ms", 1e-3)
-    """Length of the clean-up, s; None: until the stop rule holds."""
-    quiet_s: ClassVar = InSI[float | None]("quiet_ms", 1e-3)
-    """Time without a fine that comes out which ends the clean-up, s, if given."""
-    cap_s: ClassVar = InSI[float | None]("cap_ms", 1e-3)
-    """Time at which the clean-up ends at the latest, s, if given."""
 
 
 class InvasionChoices(Part):
@@ -461,13 +381,12 @@ class InvasionChoices(Part):
     """
 
     method: Literal["liggghts", "network", "both"] = "liggghts"
-    """"liggghts": every fine is a sphere. "network": the fast model, whose solids are
-    concentrations of size classes; `fdnet run --fast` asks for it. "both": spheres above
-    `fines.cut_um`, and what is finer as classes in the same flow."""
+    """"liggghts": every fine is a sphere. "network": all solids are size classes, as with `fdnet
+    run --fast`. "both": spheres above `fines.cut_um`, classes below it."""
     classes: Annotated[int, Field(ge=1, le=40)] = 8
-    """Size classes, equal over the logarithm of the diameter."""
+    """Number of size classes, equal over ln d."""
     sticking: Annotated[float, Field(ge=0, le=1)] = 0.0
-    """Share of the contacts of fines with grains that stick; 0 leaves attachment out."""
+    """Share of the contacts of fines with grains that stick."""
 
 
 class MudCake(Part):
@@ -477,13 +396,11 @@ class MudCake(Part):
     """
 
     permeability_m2: Annotated[float, Field(gt=0, le=1e-9)] | None = None
-    """Permeability of the cake. When absent, without a filtrate too: that of Carman and Kozeny for
-    the classes in it."""
+    """Permeability of the cake. When both are absent: by Carman and Kozeny for its classes."""
     api_filtrate_mL: Positive | None = None
-    """Filtrate of the API's press instead: 30 minutes at 690 kPa through 45.8 cm2."""
+    """Filtrate of the API's press instead: 30 minutes, 690 kPa, 45.8 cm2."""
 
     api_filtrate_m3: ClassVar = InSI[float | None]("api_filtrate_mL", 1e-6)
-    """Filtrate of the API's press, m3, if given."""
 
 
 def _count_or_edges(value: Any) -> str:
@@ -517,30 +434,27 @@ class AnalysisChoices(Part):
     """
 
     sections: Sections = 8
-    """Number of equal slabs along the flow in `sections.csv`. In Python also the edges (S+1,) of
-    the slabs, m."""
+    """Number of equal slabs along the flow. In Python also their edges (S+1,), m."""
     law: LawName = DEFAULT_LAW
     """Conductance of a clean throat."""
     damage_law: DamageLawName = Field(
         AUTO,
         description='How fines lower the permeability: "all-spheres", the network of grains and '
-        "fines together, or a law that damages the throats between grains. "
-        f'"auto" takes "all-spheres" up to {MOST_SPHERES:,} spheres and "section-archie" above.',
+        'fines, or a law that damages the throats of the grains. "auto": "all-spheres" up to '
+        f'{MOST_SPHERES:,} spheres, "section-archie" above.',
     )
     clogging_threshold: Fraction | None = None
-    """Throat porosity below which the thesis's damage laws take a throat as clogged. When absent:
-    0.40 ("thesis") or 0.36 ("thesis-code")."""
+    """Throat porosity below which the thesis's laws close a throat. When absent: 0.40 ("thesis")
+    or 0.36 ("thesis-code")."""
     middle_band: Literal["threshold", "position"] = "threshold"
-    """Rule of the thesis's damage laws for a throat porosity of 0.36 to 0.80: by
-    `clogging_threshold` alone, or by where the fines lie in the throat."""
+    """The thesis's rule for a throat porosity of 0.36 to 0.80: by `clogging_threshold`, or by
+    where the fines lie."""
     throat_overlap: Literal["exact", "two-plane"] = "exact"
-    """Volume of a fine inside a throat: exact, or by the thesis's two planes."""
+    """Volume of a fine in a throat: exact, or by the thesis's two planes."""
     profile_bin_mm: Positive | None = 0.25
-    """Width of the depth bins in `profile.csv`. In Python also None, the mean radius of the
-    grains."""
+    """Width of the bins of `profile.csv`. In Python also None, the mean radius of the grains."""
     walls: WallName = "no-slip"
-    """Whether side walls hold the fluid or let it slip; known to "lubrication", "section-archie"
-    and "all-spheres"."""
+    """Whether side walls hold the fluid; the thesis's laws do not know it."""
 
     @field_validator("law", "damage_law", mode="before")
     @classmethod
@@ -557,7 +471,6 @@ class AnalysisChoices(Part):
             )
 
     profile_bin_m: ClassVar = InSI[float | None]("profile_bin_mm", 1e-3)
-    """Width of the depth bins, m; None stands for the mean radius of the grains."""
 
     @classmethod
     def of_pack(cls, **keys: Any) -> "AnalysisChoices":
@@ -611,7 +524,4 @@ def _refusal(item: Any) -> str:
     if item["type"] == "extra_forbidden":
         known = ", ".join(AnalysisChoices.model_fields)
         return f"analysis.{key}: unknown key; choose some of {known}"
-    what = (
-        item["msg"].replace("Input should be", "should be").replace("should be a valid", "is no")
-    )
-    return f"analysis.{key}: {item['input']!r} {what}"
+    return f"analysis.{key}: {item['input']!r} {item['msg'].replace('Input should', 'should')}"

@@ -173,8 +173,8 @@ class CleanUpStage(ChunkedStage):
         return "cap", [
             Doubt(
                 "clean-up-at-its-cap",
-                "the clean-up stopped at its cap while fines still came out: raise "
-                "clean_up.cap_ms",
+                "the clean-up stopped at its cap while fines still came out: give "
+                "clean_up.duration_ms",
             )
         ]
 

@@ -356,11 +356,9 @@ def moving_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, An
     # a skin of 0.3 to 0.8 of the diameter of the smallest fine was measured to be fastest; where
     # the flow follows the deposit, steps are short and most fines stand: a fifth of the time less
     skin = (0.3 if case.drag.coupled else 1.0) * case.fines.radius_range_m[0]
-    skin = skin if case.run.skin_m is None else case.run.skin_m
     walls = _friction(case, scales, walls_only=True)
     return dump_variables(case) | {
         "skin": number(skin),
-        "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
         "contacts": contact_variables(case, scales, "invade", friction=_friction(case, scales)),
         "time_step": number(scales.time_step),
         "walls": wall_variables(case, "invade", friction=walls),

@@ -19,7 +19,7 @@ import numpy as np
 
 from fdnet.network.fines.crowding import REACH, local_porosity
 from fdnet.network.specimen import cake_of, cake_thickness
-from fdnet.scales.drag import Crowd, crowd_drag_factor
+from fdnet.scales.drag import crowd_drag_factor
 from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
@@ -50,8 +50,8 @@ def standing_cake(spheres: Snapshot, periodic: Sequence[bool]) -> Standing:
     near = local_porosity(around, (False, bool(periodic[1]), bool(periodic[2])))
     own = slice(len(near.porosity) - len(fines), None)
     porosity = near.porosity[own]
-    crowd = Crowd(porosity=porosity, size_ratio=near.size_ratio[own])
-    drag = 6.0 * np.pi * fines.radius * crowd_drag_factor(crowd) / porosity
+    factor = crowd_drag_factor(porosity, near.size_ratio[own])
+    drag = 6.0 * np.pi * fines.radius * factor / porosity
     area = float(np.prod(np.ptp(spheres.box[1:], axis=1)))
     return Standing(fines, drag / area, cake_thickness(fines))
 

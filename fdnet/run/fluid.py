@@ -39,7 +39,7 @@ from fdnet.run.network_flow import (
     pack_flow,
     placed,
 )
-from fdnet.scales.drag import Crowd, crowd_drag_factor
+from fdnet.scales.drag import crowd_drag_factor
 from fdnet.scales.flow import darcy_through, path_of
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -51,8 +51,7 @@ def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, sli
     It is the total force in the crowd, Y F_b / phi.
     """
     reynolds = scales.push.reynolds_slope * radius / near.size_ratio * slip
-    crowd = Crowd(porosity=near.porosity, size_ratio=near.size_ratio, reynolds=reynolds)
-    return crowd_drag_factor(crowd) / near.porosity
+    return crowd_drag_factor(near.porosity, near.size_ratio, reynolds) / near.porosity
 
 
 def _speed(velocity: Array) -> Array:

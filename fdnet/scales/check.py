@@ -9,7 +9,7 @@ import numpy as np
 
 from fdnet.case.case import WIDEST_THROAT, Case, InvasionCase
 from fdnet.errors import PAGE, catalogue, explained
-from fdnet.scales.clock import TAKEN_SOLIDS, spoken_memory, spoken_time, supplied_solids
+from fdnet.scales.clock import TAKEN_SOLIDS, spoken_memory, spoken_time
 from fdnet.scales.cost import Cost, cost_of, peak_memory
 from fdnet.scales.drag import BRIDGING
 from fdnet.scales.flow import USUAL_WELL, Losses, radial
@@ -18,23 +18,14 @@ from fdnet.scales.scales import InvasionScales, Scales, scales_of
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One thing that is odd.
+    """One thing that is odd."""
 
-    Attributes:
-        key: of the case that it is about; empty where it is about no single one.
-        what: what is odd; a `Doubt` where it is one of the warnings of the scales.
-        follows: what follows for the answer.
-        do: what to do.
-        read: the page that says more.
-        refused: whether `fdnet run` refuses the case for it.
-    """
-
-    key: str
-    what: str
-    follows: str
-    do: str
-    read: str
-    refused: bool = False
+    key: str  # of the case that it is about; empty where it is about no single one
+    what: str  # what is odd; a `Doubt` where it is one of the warnings of the scales
+    follows: str  # what follows for the answer
+    do: str  # what to do
+    read: str  # the page that says more
+    refused: bool = False  # whether `fdnet run` refuses the case for it
 
     @property
     def sentence(self) -> str:
@@ -99,7 +90,7 @@ def findings(case: Case, scales: Scales) -> Iterator[Finding]:
     mean, periodic, side = case.grains.sauter_diameter_m, case.periodic[1], min(case.size_m[1:])
     error = width_error(side / mean, periodic=periodic)
     if abs(error) >= MOST_WIDTH_ERROR:
-        wider = next(
+        wide = (
             n for n in range(2, 200) if abs(width_error(n, periodic=periodic)) < MOST_WIDTH_ERROR
         )
         sides = "" if periodic else "box.sides = 'periodic', or "
@@ -109,7 +100,7 @@ def findings(case: Case, scales: Scales) -> Iterator[Finding]:
             follows=f"its intact permeability is about {100 * abs(error):.0f} % "
             f"{'below' if error < 0 else 'above'} that of the bulk sand (packs of equal grains); "
             "the ratio of damaged to intact suffers less",
-            do=f"take {sides}a width of {1e3 * wider * mean:.2g} mm for less than "
+            do=f"take {sides}a width of {1e3 * next(wide) * mean:.2g} mm for less than "
             f"{100 * MOST_WIDTH_ERROR:.0f} %, or use the ratio only",
             read="docs/evidence/error_against_time.md",
         )
@@ -158,24 +149,23 @@ def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Fin
             read="docs/how-to/choose_the_velocity.md",
         )
     # the slab runs out, or the time, before as much has come as plugged the shipped cases
-    solids = supplied_solids(case, scales.slab_length)
+    solids = scales.slab_length * case.solids_fraction / case.grains.curve.size_at(0.5)
     feeding = scales.slab_length / scales.upstream_velocity
     come = solids * min(1.0, scales.cap_time / feeding)
     if scales.throat_ratio >= BRIDGING and come < TAKEN_SOLIDS:
-        length = TAKEN_SOLIDS / solids * scales.slab_length
-        by_time = scales.cap_time < feeding
+        more, by_time = TAKEN_SOLIDS / solids, scales.cap_time < feeding
         key = "fines.count" if fines.count is not None else "fines.slab_mm"
         key = "fines" if fines.endless else key  # so many of them that the mud is cut off
+        supply = (
+            f"supply {1e3 * more * scales.slab_length:.2g} mm of mud ({more:.2g} times as much)"
+        )
         yield Finding(
             key="run.cap_ms" if by_time else key,
             what=f"the fines that come would fill {come:.2g} of a median grain's depth; the "
             f"shipped cases were plugged by 0.1 to {TAKEN_SOLIDS:g}",
             follows="the mud, or the time, may run out before the face plugs; then more mud would "
             "do more damage",
-            do="give the run more time (run.cap_ms or run.duration_ms)"
-            if by_time
-            else f"supply {1e3 * length:.2g} mm of mud "
-            f"({TAKEN_SOLIDS / solids:.2g} times as much)",
+            do="give the run more time (run.cap_ms or run.duration_ms)" if by_time else supply,
             read="docs/start/first_answer.md",
         )
     # solids that pass no throat between the largest grains
@@ -216,19 +206,12 @@ def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Fin
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
-    """What is odd about a case, and what it takes.
+    """What is odd about a case, and what it takes."""
 
-    Attributes:
-        name: of the case.
-        findings: what is odd; what `fdnet run` refuses comes first.
-        cost: of the run.
-        memory: bytes at most, of one process.
-    """
-
-    name: str
-    findings: tuple[Finding, ...]
-    cost: Cost
-    memory: float
+    name: str  # of the case
+    findings: tuple[Finding, ...]  # what is odd; what `fdnet run` refuses comes first
+    cost: Cost  # of the run
+    memory: float  # bytes at most, of one process
 
     def data(self) -> dict[str, Any]:
         """As plain values."""
@@ -262,8 +245,7 @@ class Checked:
             f"time: {spoken_time(cost.seconds)} on one idle core, within a factor of 2 ({parts})",
             f"memory: {spoken_memory(self.memory)}",
         ]
-        plural = "" if count == 1 else "s"
-        head = f"{count} thing{plural} to look at" if count else "fine"
+        head = f"{count} thing{'s' * (count > 1)} to look at" if count else "fine"
         wrapped = textwrap.TextWrapper(
             96, subsequent_indent=" " * 8, break_on_hyphens=False, break_long_words=False
         )
@@ -272,16 +254,10 @@ class Checked:
 
 def checked(case: Case, scales: Scales, refusals: Iterable[str] = ()) -> Checked:
     """All that is odd about a case; `refusals` are why `fdnet run` would not take it."""
+    follows = "fdnet run refuses the case"
     refused = [
-        Finding(
-            key=text.split(":")[0],
-            what=text,
-            follows="fdnet run refuses the case",
-            do="",
-            read="",
-            refused=True,
-        )
-        for text in refusals
+        Finding(key=one.split(":")[0], what=one, follows=follows, do="", read="", refused=True)
+        for one in refusals
     ]
     return Checked(
         name=case.name,
@@ -293,15 +269,9 @@ def checked(case: Case, scales: Scales, refusals: Iterable[str] = ()) -> Checked
 
 def every_finding(case: Case, scales: Scales) -> list[Finding]:
     """All that is odd about a case: what `fdnet check` says, and the summary of its run."""
-    known = catalogue()
     of_scales = [
-        Finding(
-            key="",
-            what=one,
-            follows=known[one.kind].follows,
-            do=known[one.kind].do,
-            read=f"{PAGE}#{one.kind}",
-        )
+        Finding(key="", what=one, follows=entry.follows, do=entry.do, read=f"{PAGE}#{one.kind}")
         for one in scales.warnings
+        for entry in [catalogue()[one.kind]]
     ]
     return [*findings(case, scales), *of_scales]

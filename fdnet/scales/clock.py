@@ -16,7 +16,7 @@ from fdnet.scales.contacts import (
     sticking_of,
     two_digits_up,
 )
-from fdnet.scales.drag import BRIDGING, Crowd, crowd_drag_factor, push_of, throat_width
+from fdnet.scales.drag import BRIDGING, crowd_drag_factor, push_of, throat_width
 from fdnet.scales.flow import (
     Drive,
     Velocity,
@@ -39,11 +39,6 @@ MUD_SOLIDS, MUD_PORES, MUD_FINES = 10 * TAKEN_SOLIDS, 2.0, 200_000
 """Where neither `fines.count` nor `fines.slab_mm` is given the mud comes until the stop rule, but
 no more than ten times the solids that plugged the shipped cases. Fines that are too small to
 bridge end after two volumes of the pores, and no mud has more fines than the last number."""
-
-
-def supplied_solids(case: InvasionCase, slab: float) -> float:
-    """Fines of a slab of `slab` m a unit of face, over the median diameter of the grains."""
-    return slab * case.solids_fraction / case.grains.curve.size_at(0.5)
 
 
 def present_share(case: InvasionCase, *, duration: float, feeding: float) -> float:
@@ -92,15 +87,10 @@ def spoken_memory(size: float) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slab:
-    """The suspension upstream of the formation face.
+    """The suspension upstream of the formation face."""
 
-    Attributes:
-        count: number of fines in it.
-        length: m, along the flow; never shorter than the largest fine.
-    """
-
-    count: int
-    length: float
+    count: int  # number of fines in it
+    length: float  # m, along the flow; never shorter than the largest fine
 
 
 def slab_of(case: InvasionCase, throat_ratio: float) -> Slab:
@@ -111,9 +101,9 @@ def slab_of(case: InvasionCase, throat_ratio: float) -> Slab:
     come (`MUD_SOLIDS`). `throat_ratio` is that of the largest fine to the throats.
     """
     fines = case.fines
-    area, volume = case.size_m[1] * case.size_m[2], fines.mean_volume_m3
     if fines.endless:
         return _most_mud(case, throat_ratio)
+    area, volume = case.size_m[1] * case.size_m[2], fines.mean_volume_m3
     least = 2 * fines.radius_range_m[1]
     if fines.count is not None:
         length = max(fines.count * volume / (fines.placed_fraction * area), least)
@@ -136,9 +126,8 @@ def _most_mud(case: InvasionCase, throat_ratio: float) -> Slab:
 
 def arrival_time(case: InvasionCase, upstream: float) -> float:
     """Mean time between two fines that arrive at the face, v / (c A u), s; u = `upstream` m/s."""
-    return case.fines.mean_volume_m3 / (
-        case.fines.placed_fraction * case.size_m[1] * case.size_m[2] * upstream
-    )
+    fines, (_, width, height) = case.fines, case.size_m
+    return fines.mean_volume_m3 / (fines.placed_fraction * width * height * upstream)
 
 
 def slab_warnings(case: InvasionCase, slab: Slab) -> list[Doubt]:
@@ -161,25 +150,19 @@ ARRIVALS = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StopTimes:
-    """Times of the stop rule, s of the simulation.
+    """Times of the stop rule, s of the simulation."""
 
-    Attributes:
-        plug: the face counts as plugged when no fine has crossed it for this time.
-        cap: the invasion ends at this time at the latest.
-        chunk: time between two checkpoints.
-    """
-
-    plug: float
-    cap: float
-    chunk: float
+    plug: float  # the face counts as plugged when no fine has crossed it for this time
+    cap: float  # the invasion ends at this time at the latest
+    chunk: float  # time between two checkpoints
 
 
 def stop_times(case: InvasionCase, slab: Slab, drive: Drive, *, upstream: float) -> StopTimes:
     """The times that the case gives, or those that follow from the velocities.
 
     In a chunk the fluid passes about one grain diameter. A given duration is cut into equal
-    chunks, so that it is met within one drag refresh a chunk. The times of a case are physical:
-    they are divided by the factor of the drive. `upstream` is the velocity there, m/s, simulated.
+    chunks. The times of a case are physical, and are divided by the factor of the drive.
+    `upstream` is the velocity there, m/s, simulated.
     """
     run, clock = case.run, 1 / drive.factor
     passage = 2 * case.grains.mean_radius_m / drive.velocity
@@ -203,10 +186,7 @@ def chunk_refreshes(case: InvasionCase, chunk: float, refresh: float) -> int:
 
 
 def plug_warnings(case: InvasionCase, plug: float, drive: Drive, upstream: float) -> list[Doubt]:
-    """The plug time is too short for the suspension; empty when it is not.
-
-    `plug` is in s and `upstream` in m/s, both as simulated.
-    """
+    """The `plug` time, s as simulated, is too short for the suspension; empty when it is not."""
     if plug >= ARRIVALS * arrival_time(case, upstream):
         return []
     text = (
@@ -238,10 +218,7 @@ _ROUNDING = 1 + 1e-12
 def relaxation_time(
     radius: float, density: float, viscosity: float, multiplier: float = 1.0
 ) -> float:
-    """tau = m / (6 pi mu r M) = 2 r^2 rho / (9 mu M), s (Stokes 1851).
-
-    For a sphere of `radius` m and `density` kg/m3 in a liquid of `viscosity` Pa s.
-    """
+    """tau = m / (6 pi mu r M) = 2 r^2 rho / (9 mu M), s (Stokes 1851)."""
     return 2 * radius**2 * density / (9 * viscosity * multiplier)
 
 
@@ -288,23 +265,22 @@ def time_step(case: Case, contacts: dict[str, Contact], tau: float) -> float:
     factor breaks the contact bound, or a given step exceeds tau while drag is explicit.
     """
     bound, given = contact_step(case, contacts), case.run.time_step_s
-    largest = largest_factor(case, contacts)
+    largest, explicit = largest_factor(case, contacts), case.drag.scheme != "implicit"
     if given is None:
-        if step_factor(case, contacts) > largest:
-            most = math.floor(largest * 1e3) / 1e3
+        factor = step_factor(case, contacts)
+        if factor > largest:
             raise CaseError(
-                f"run.time_step_factor: {case.run.time_step_factor:g} is above {largest:.3g}, the "
-                "largest that is stable with the damping_ratio, contact.model and "
-                f"contact.rolling_friction of this case; take at most {most:g}"
+                f"run.time_step_factor: {factor:g} is above {largest:.3g}, the largest that is "
+                "stable with the damping_ratio, contact.model and contact.rolling_friction of the "
+                f"case; take at most {math.floor(largest * 1e3) / 1e3:g}"
             )
-        derived = step_factor(case, contacts) * bound
-        return derived if case.drag.scheme == "implicit" else min(derived, DRAG_WARNING * tau)
+        return min(factor * bound, DRAG_WARNING * tau) if explicit else factor * bound
     if given > largest * bound * _ROUNDING:
         raise CaseError(
             f"run.time_step_s: {given:g} s is above the contact bound {largest:.3g} "
             f"sqrt(m/k) = {largest * bound:.3g} s; lower it or run.stiffness_N_m"
         )
-    if case.drag.scheme != "implicit" and given > DRAG_LIMIT * tau * _ROUNDING:
+    if explicit and given > DRAG_LIMIT * tau * _ROUNDING:
         raise CaseError(
             f"run.time_step_s: {given:g} s is above the drag relaxation time {tau:.3g} s, "
             "explicit drag would overshoot; lower it, or take drag.scheme = 'implicit'"
@@ -323,16 +299,12 @@ def hold_steps(case: Case, step: float, tau: float, longest: float) -> int:
     given, most = case.drag.refresh_steps, math.ceil(longest / step)
     if given is None:
         return max(1, min(math.floor(HOLD_OVER_RELAXATION * tau / step), most))
-    if given * step > DRAG_LIMIT * tau * _ROUNDING:
+    stable = math.floor(DRAG_LIMIT * tau / step * _ROUNDING)
+    if given > min(stable, most):
         raise CaseError(
             f"drag.refresh_steps: {given} steps of {step:.3g} s exceed the drag relaxation time "
-            f"{tau:.3g} s; at most {math.floor(DRAG_LIMIT * tau / step * _ROUNDING)} steps are "
-            "stable"
-        )
-    if given > most:
-        raise CaseError(
-            f"drag.refresh_steps: {given} steps of {step:.3g} s are longer than the "
-            f"{longest:.3g} s between checkpoints; expected at most {most}"
+            f"{tau:.3g} s or the {longest:.3g} s between checkpoints; expected at most "
+            f"{min(stable, most)}"
         )
     return given
 
@@ -349,9 +321,8 @@ def drag_warnings(case: Case, held: float) -> list[Doubt]:
     if implicit:
         text = (
             f"implicit drag with a time step of {held:.3g} relaxation times (above {limit:g}): "
-            "the difference of a fine's velocity to the fluid's turns into "
-            f"{(2 - held) / (2 + held):.2g} of it each step instead of {math.exp(-held):.2g}; "
-            "lower run.time_step_s to resolve it"
+            f"each step leaves {(2 - held) / (2 + held):.2g} of a fine's slip instead of "
+            f"{math.exp(-held):.2g}; lower run.time_step_s to resolve it"
         )
         return [Doubt("implicit-drag", text)]
     remedy = "drag.refresh_steps or " if case.drag.scheme == "held" else ""
@@ -386,7 +357,7 @@ def drive_in(case: InvasionCase, velocity: Velocity) -> Drive:
     time = relaxation_times(case)[1]
     if case.drag.coupled:
         mud = 1 - case.fines.placed_fraction
-        time /= float(crowd_drag_factor(Crowd(porosity=mud))) / mud
+        time /= float(crowd_drag_factor(mud)) / mud
     return drive_of(case, own.velocity, time, free)
 
 
@@ -408,8 +379,7 @@ def deposit_pressure(case: InvasionCase, flow: Velocity, porosity: float) -> flo
 
     h their volume a unit of face, d their Sauter diameter, e = `RANDOM_CLOSE`. On the way w the
     overbalance leaves them p (L + r) / (w + r), and a constant rate p (L + r) / w. A rate that
-    may fall to the share s (`run.stop_rate`) lets r grow to w (1 / s - 1). Mud that comes until
-    the stop rule brings what is ample to plug the face (`PLUG_SOLIDS`).
+    may fall to the share s (`run.stop_rate`) lets r grow to w (1 / s - 1).
     """
     run, fines, length = case.run, case.fines, case.size_m[0]
     pressure = driving_pressure(case, flow.pressure_gradient)
@@ -443,10 +413,8 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
     """The case with a number for `run.stiffness_N_m` = "auto"; any other case as it is.
 
     It is the least number of two digits at which every predicted overlap is at most `PRESSED`;
-    in the uniform field at least the default. A force presses a linear contact in by F / k and an
-    impact by w sqrt(m / k); by Hertz they go with the powers -2/3 and -2/5 of the modulus. Where
-    the springs may be stiffened later, and the `start` is asked for, a deposit gets `STARTING` of
-    what it needs.
+    in the uniform field at least the default. Where the springs may be stiffened later, and the
+    `start` is asked for, a deposit gets `STARTING` of what it needs.
     """
     if case.run.stiffness_N_m != "auto":
         return case
@@ -466,6 +434,7 @@ def stiff_enough(case: AnyCase, *, start: bool = True) -> AnyCase:
     contact, factor = contacts["grain-fine"], step_factor(case, contacts)
     borne = deposit_pressure(soft, flow, porosity)
     deep = overlaps_of(soft, contact, flow, drive_in(soft, flow), porosity, borne)
+    # F / k and w sqrt(m / k) of linear contacts; by Hertz the powers -2/3 and -2/5 of the modulus
     held, struck = (1.5, 2.5) if soft.contact.model == "hertz" else (1.0, 2.0)
     raised = max(
         0.0 if soft.drag.coupled else 1.0,

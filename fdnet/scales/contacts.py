@@ -27,15 +27,10 @@ the stiffness at `REFERENCE_OVERLAP`."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairModuli:
-    """Elastic constants of a pair of materials, as they are used.
+    """Elastic constants of a pair of materials, as they are used."""
 
-    Attributes:
-        modulus: E* = 1 / ((1 - nu1^2) / E1 + (1 - nu2^2) / E2), Pa.
-        shear: G* = 1 / ((2 - nu1) / G1 + (2 - nu2) / G2), Pa, with G = E / 2 (1 + nu).
-    """
-
-    modulus: float
-    shear: float
+    modulus: float  # E* = 1 / ((1 - nu1^2) / E1 + (1 - nu2^2) / E2), Pa
+    shear: float  # G* = 1 / ((2 - nu1) / G1 + (2 - nu2) / G2), Pa, with G = E / 2 (1 + nu)
 
 
 def elastic(first: tuple[float, float], second: tuple[float, float]) -> PairModuli:
@@ -92,16 +87,6 @@ def collision_time(mass: float, velocity: float, modulus: float, radius: float) 
     return constant * overlap_of_impact(mass, velocity, modulus, radius) / velocity
 
 
-def rayleigh_time(radius: float, density: float, young: float, poisson: float) -> float:
-    """pi r sqrt(rho / G) / (0.1631 nu + 0.8766), s: a Rayleigh wave along half a sphere.
-
-    Of a sphere of `radius` m and `density` kg/m3, with Young's modulus in Pa (Thornton and
-    Randall 1988).
-    """
-    shear = young / (2 * (1 + poisson))
-    return math.pi * radius * math.sqrt(density / shear) / (0.1631 * poisson + 0.8766)
-
-
 def restitution_of(damping: float) -> float:
     """exp(-pi z / sqrt(1 - z^2)), of a contact of the damping ratio z < 1 that may pull.
 
@@ -132,11 +117,7 @@ which are stable with it (damping ratio 0.48): drag has stopped a fine before it
 
 
 def pair_stokes(mass: float, radius: float, velocity: float, viscosity: float) -> float:
-    """m_eff v / (6 pi mu R*^2), the impact Stokes number of a pair.
-
-    For the effective mass in kg, R* in m, the velocity of approach in m/s, and the viscosity in
-    Pa s. Of a sphere and a wall it is 2 r rho v / (9 mu) (Joseph and others 2001).
-    """
+    """m_eff v / (6 pi mu R*^2), the impact Stokes number of a pair (Joseph and others 2001)."""
     return mass * velocity / (6 * math.pi * viscosity * radius**2)
 
 
@@ -172,31 +153,22 @@ class Contact:
 
     A Hertz contact has no stiffness of its own: its stiffnesses are those at an overlap of
     `fdnet.scales.contacts.REFERENCE_OVERLAP`.
-
-    Attributes:
-        pair: names of the two materials, such as "grain-fine".
-        normal_stiffness: N/m, force over overlap.
-        shear_stiffness: N/m.
-        friction: coefficient of sliding friction.
-        damping_ratio: damping over the critical one.
-        damping_rate: 1/s, viscous damping force over effective mass and velocity.
-        contact_time: s, half a period of the damped oscillation; of a Hertz contact the duration
-            of an undamped collision at the velocity of the fluid.
-        step_limit: s, sqrt(m/k) of the lighter sphere.
-        elastic: constants of a Hertz contact; None when the contact is linear.
-        stokes: impact Stokes number at the velocity of the fluid; None where the restitution does
-            not depend on it.
     """
 
-    pair: str
-    normal_stiffness: float
-    shear_stiffness: float
-    friction: float
-    damping_ratio: float
-    damping_rate: float
+    pair: str  # names of the two materials, such as "grain-fine"
+    normal_stiffness: float  # N/m, force over overlap
+    shear_stiffness: float  # N/m
+    friction: float  # coefficient of sliding friction
+    damping_ratio: float  # damping over the critical one
+    damping_rate: float  # 1/s, viscous damping force over effective mass and velocity
+    # s, half a period of the damped oscillation; of a Hertz contact the duration of an undamped
+    # collision at the velocity of the fluid
     contact_time: float
-    step_limit: float
+    step_limit: float  # s, sqrt(m/k) of the lighter sphere
+    # constants of a Hertz contact; None when the contact is linear
     elastic: PairModuli | None = None
+    # impact Stokes number at the velocity of the fluid; None where the restitution does not depend
+    # on it
     stokes: float | None = None
 
     @property
@@ -223,16 +195,14 @@ def mass_range(spheres: Spheres) -> tuple[float, float]:
 
 def contacts_of(case: Case, velocity: float) -> dict[str, Contact]:
     """The contact of each pair of materials, by its name, in a fluid of a velocity in m/s."""
-    contact = _hertz_contact if case.contact.model == "hertz" else _hooke_contact
     factor = stiffness_factor(case)
-    return {"-".join(pair): contact(case, pair, factor, velocity) for pair in _pairs_of(case)}
+    return {"-".join(pair): _contact(case, pair, factor, velocity) for pair in _pairs_of(case)}
 
 
 def stiffness_factor(case: Case) -> float:
     """Factor from the materials' stiffness, or Young's moduli, to those that are used.
 
-    It is run.stiffness_N_m over that of the stiffest pair. With Hertz contacts pairs of a fine
-    count, those of grains only in a case without fines.
+    With Hertz contacts pairs of a fine count, those of grains only in a case without fines.
     """
     given, pairs = case.run.stiffness_N_m, _pairs_of(case)
     if given == "nominal":
@@ -255,43 +225,34 @@ def _spheres(case: Case, name: str) -> Spheres:
     return case.spheres["fine" if "fine" in name else "grain"]
 
 
-def _hooke_contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) -> Contact:
-    first, second = (_spheres(case, name) for name in pair)
-    normal = factor * series(first.normal_stiffness_N_m, second.normal_stiffness_N_m)
+def _contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) -> Contact:
+    lighter, mass = _spheres(case, "".join(pair)), _effective_mass(case, pair)
     damping, stokes = _damping_and_stokes(case, pair, velocity)
-    frequency = math.sqrt(normal / _effective_mass(case, pair))
+    constants = None
+    if case.contact.model == "hooke":
+        first, second = (_spheres(case, name) for name in pair)
+        normal = factor * series(first.normal_stiffness_N_m, second.normal_stiffness_N_m)
+        shear = factor * series(first.tangential_stiffness, second.tangential_stiffness)
+        stiffest, frequency = normal, math.sqrt(normal / mass)
+        rate = 2 * damping * frequency
+        time = math.pi / (frequency * math.sqrt(1 - damping**2))
+    else:
+        constants, size = pair_elastic(case, pair, factor), lighter.mean_radius_m
+        normal, joint = _secant(case, pair, factor), pair_radius(case, pair, size)
+        shear = tangential_stiffness(constants.shear, joint, REFERENCE_OVERLAP * 2 * size)
+        rate = 2 * damping * math.sqrt(1.25 * normal / mass)
+        time = collision_time(mass, velocity, constants.modulus, joint)
+        least = lighter.radius_range_m[0]
+        smallest, deep = pair_radius(case, pair, least), STEP_OVERLAP * 2 * least
+        stiffest = 1.5 * secant_stiffness(constants.modulus, smallest, deep)
     return Contact(
         pair="-".join(pair),
         normal_stiffness=normal,
-        shear_stiffness=factor * series(first.tangential_stiffness, second.tangential_stiffness),
+        shear_stiffness=shear,
         friction=_friction(case, pair),
         damping_ratio=damping,
-        damping_rate=2 * damping * frequency,
-        contact_time=math.pi / (frequency * math.sqrt(1 - damping**2)),
-        step_limit=math.sqrt(mass_range(_spheres(case, "".join(pair)))[0] / normal),
-        stokes=stokes,
-    )
-
-
-def _hertz_contact(case: Case, pair: tuple[str, str], factor: float, velocity: float) -> Contact:
-    lighter = _spheres(case, "".join(pair))
-    constants, mass = pair_elastic(case, pair, factor), _effective_mass(case, pair)
-    radius = pair_radius(case, pair, lighter.mean_radius_m)
-    overlap = REFERENCE_OVERLAP * 2 * lighter.mean_radius_m
-    normal = _secant(case, pair, factor)
-    damping, stokes = _damping_and_stokes(case, pair, velocity)
-    least = lighter.radius_range_m[0]
-    stiffest = 1.5 * secant_stiffness(
-        constants.modulus, pair_radius(case, pair, least), STEP_OVERLAP * 2 * least
-    )
-    return Contact(
-        pair="-".join(pair),
-        normal_stiffness=normal,
-        shear_stiffness=tangential_stiffness(constants.shear, radius, overlap),
-        friction=_friction(case, pair),
-        damping_ratio=damping,
-        damping_rate=2 * damping * math.sqrt(1.25 * normal / mass),
-        contact_time=collision_time(mass, velocity, constants.modulus, radius),
+        damping_rate=rate,
+        contact_time=time,
         step_limit=math.sqrt(mass_range(lighter)[0] / stiffest),
         elastic=constants,
         stokes=stokes,
@@ -318,11 +279,7 @@ def _friction(case: Case, pair: tuple[str, str]) -> float:
 def _damping_and_stokes(
     case: Case, pair: tuple[str, str], velocity: float
 ) -> tuple[float, float | None]:
-    """Damping ratio of a contact, and the impact Stokes number where the liquid decides it.
-
-    Dry it is the mean of the two materials, a wall taking the sphere's. `velocity` is the fluid's,
-    m/s.
-    """
+    """Damping ratio of a contact, and the impact Stokes number where the liquid decides it."""
     spheres = [case.spheres[name] for name in pair if name != "wall"]
     dry = sum(one.damping_ratio for one in spheres) / len(spheres)
     if "fine" not in pair or case.contact.restitution != "liquid":
@@ -366,12 +323,8 @@ def _effective_mass(case: Case, pair: tuple[str, str]) -> float:
     Walls have infinite mass, and fixed grains too while fines invade; so it is in LIGGGHTS.
     """
     fixed = {"wall", "grain"} if "fine" in pair and case.grains.motion == "fixed" else {"wall"}
-    inverse = 0.0
-    for name in pair:
-        if name not in fixed:
-            one = case.spheres[name]
-            inverse += 1 / sphere_mass(one.mean_radius_m, one.mean_density_kg_m3)
-    return 1 / inverse
+    free = [case.spheres[name] for name in pair if name not in fixed]
+    return 1 / sum(1 / sphere_mass(one.mean_radius_m, one.mean_density_kg_m3) for one in free)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -389,16 +342,11 @@ others, Phys. Rev. Lett. 77, 274, 1996). Runs of the quick specimen 5 had 1 to 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Overlaps:
-    """Predicted overlaps of a fine with a grain, over the diameter of the largest fine.
+    """Predicted overlaps of a fine with a grain, over the diameter of the largest fine."""
 
-    Attributes:
-        drag: by drag and pressure gradient F on a fine at rest: F / k, or by Hertz.
-        impact: by a fine that arrives at its fastest velocity w: w sqrt(m / k), or by Hertz.
-        deposit: where the flow follows the deposit, by the force of the pressure on it; else 0.
-    """
-
-    drag: float
-    impact: float
+    drag: float  # by drag and pressure gradient F on a fine at rest: F / k, or by Hertz
+    impact: float  # by a fine that arrives at its fastest velocity w: w sqrt(m / k), or by Hertz
+    # where the flow follows the deposit, by the force of the pressure on it; else 0
     deposit: float
 
 
@@ -412,8 +360,7 @@ def overlaps_of(
 ) -> Overlaps:
     """The overlaps in the `contact` of a grain and a fine, as simulated, in a pack of a porosity.
 
-    A fine comes with the fluid and gains speed by the pressure gradient across a pore. A deposit
-    bears the `pressure`, Pa of the fluid itself, which acts on the section of a throat; contacts
+    A deposit bears the `pressure`, Pa of the fluid itself, on the section of a throat; contacts
     hand the forces on to each other, so that some bear several times as much (`LARGEST_CHAIN`).
     """
     push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
@@ -433,9 +380,8 @@ def overlaps_of(
     else:
         impact = velocity * math.sqrt(mass / contact.normal_stiffness)
         drag, held = force / contact.normal_stiffness, deposit / contact.normal_stiffness
-    return Overlaps(
-        impact=impact / (2 * radius), drag=drag / (2 * radius), deposit=held / (2 * radius)
-    )
+    wide = 2 * radius
+    return Overlaps(impact=impact / wide, drag=drag / wide, deposit=held / wide)
 
 
 def overlap_warnings(case: InvasionCase, overlaps: Overlaps) -> list[Doubt]:
@@ -443,25 +389,21 @@ def overlap_warnings(case: InvasionCase, overlaps: Overlaps) -> list[Doubt]:
 
     Raises CaseError when one of them alone would press a fine half through a grain.
     """
-    for name, remedy in {
-        "drag": "drag.multiplier, fluid.viscosity_cP or fluid.velocity_m_s",
-        "impact": "the velocity (fluid.velocity_m_s)",
-        "deposit": "the pressure (fluid.overbalance_MPa, fluid.velocity_m_s)",
-    }.items():
+    for name in ("drag", "impact", "deposit"):
         overlap = getattr(overlaps, name)
         if overlap > MOST_OVERLAP:
             raise CaseError(
                 f"run.stiffness_N_m: {name} alone would press a fine {100 * overlap:.3g} % of its "
-                f"diameter into a grain (limit {100 * MOST_OVERLAP:.0f} %); set it to "
-                f"'auto', raise it, or lower {remedy}"
+                f"diameter into a grain (limit {100 * MOST_OVERLAP:.0f} %); set it to 'auto', "
+                "raise it, or lower drag or pressure (fluid.velocity_m_s, fluid.overbalance_MPa, "
+                "drag.multiplier)"
             )
     limit, warnings = case.run.max_overlap, []
     above = f"of a fine's diameter (above run.max_overlap, {100 * limit:.3g} %)"
     if overlaps.deposit > limit:
         given, power = case.run.stiffness_N_m, 1.5 if case.contact.model == "hertz" else 1.0
-        if isinstance(given, str):
-            remedy = "; the materials are too soft for this pressure"
-        else:
+        remedy = "; the materials are too soft for this pressure"
+        if not isinstance(given, str):
             enough = two_digits_up((overlaps.deposit / limit) ** power * given)
             remedy = f": set run.stiffness_N_m = {enough:g}, or 'auto'"
         text = (
@@ -492,17 +434,11 @@ def two_digits_up(value: float) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PullOff:
-    """What it takes to part two cohesive spheres.
+    """What it takes to part two cohesive spheres."""
 
-    Attributes:
-        force: N, the largest pull that the contact bears.
-        overlap: m, at this pull.
-        resting: m, the overlap without a pull.
-    """
-
-    force: float
-    overlap: float
-    resting: float
+    force: float  # N, the largest pull that the contact bears
+    overlap: float  # m, at this pull
+    resting: float  # m, the overlap without a pull
 
 
 def pull_off(cohesion: float, modulus: float, radius: float) -> PullOff:
@@ -530,20 +466,16 @@ def cohesion_warnings(case: InvasionCase, contact: Contact) -> list[Doubt]:
     Raises CaseError when cohesion alone would draw a fine half into a grain.
     """
     share = pull_off_of(case, contact).resting / (2 * case.fines.radius_range_m[1])
+    what = f"draws a fine {100 * share:.3g} % of its diameter into a grain"
+    do = "lower contact.cohesion_J_m3, or raise run.stiffness_N_m"
     if share > MOST_OVERLAP:
-        raise CaseError(
-            f"contact.cohesion_J_m3: {case.contact.cohesion_J_m3:g} draws a fine "
-            f"{100 * share:.3g} % of its diameter into a grain (limit "
-            f"{100 * MOST_OVERLAP:.0f} %); lower it, or raise run.stiffness_N_m"
-        )
+        limit = f"limit {100 * MOST_OVERLAP:.0f} %"
+        given = f"contact.cohesion_J_m3: {case.contact.cohesion_J_m3:g}"
+        raise CaseError(f"{given} {what} ({limit}); {do}")
     if share <= case.run.max_overlap:
         return []
-    text = (
-        f"cohesion draws a fine {100 * share:.2g} % of its diameter into a grain (above "
-        f"run.max_overlap, {100 * case.run.max_overlap:.3g} %): lower contact.cohesion_J_m3 or "
-        "raise run.stiffness_N_m"
-    )
-    return [Doubt("cohesion", text)]
+    limit = f"above run.max_overlap, {100 * case.run.max_overlap:.3g} %"
+    return [Doubt("cohesion", f"cohesion {what} ({limit}): {do}")]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -563,25 +495,17 @@ _ROUNDING = 1 + 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sticking:
-    """How far a fine may lock between two touching grains.
+    """How far a fine may lock between two touching grains."""
 
-    Attributes:
-        size_ratio: radius of the fine over that of the largest grain.
-        friction: coefficient of friction of a fine against a grain.
-        slope: of the sides of the groove; friction below it holds no fine.
-        shear_ratio: tangential over normal contact stiffness, force over overlap.
-        push: force of the fluid on the fine at rest over normal stiffness and radius, F / (k r).
-        false_force: tangential force that the integrator adds in a quarter turn, over the push.
-        linear: whether the tangential stiffness can be chosen (Hertz-Mindlin's cannot).
-    """
-
-    size_ratio: float
-    friction: float
-    slope: float
-    shear_ratio: float
+    size_ratio: float  # radius of the fine over that of the largest grain
+    friction: float  # coefficient of friction of a fine against a grain
+    slope: float  # of the sides of the groove; friction below it holds no fine
+    shear_ratio: float  # tangential over normal contact stiffness, force over overlap
+    # force of the fluid on the fine at rest over normal stiffness and radius, F / (k r)
     push: float
+    # tangential force that the integrator adds in a quarter turn, over the push
     false_force: float
-    linear: bool = True
+    linear: bool = True  # whether the tangential stiffness can be chosen (Hertz-Mindlin's cannot)
 
     @property
     def by_springs(self) -> bool:
@@ -616,11 +540,8 @@ def fall_velocity(push: float, mass: float, distance: float) -> float:
 def sticking_of(case: InvasionCase, contact: Contact, push: Push, step: float) -> Sticking:
     """Of the smallest fine between two of the largest grains, which locks most easily.
 
-    Args:
-        case: the case.
-        contact: of a grain and a fine.
-        push: of the fluid; a fine rolls no faster than it drifts freely.
-        step: time step, s.
+    `contact` is that of a grain and a fine, `step` the time step, s. A fine rolls no faster than
+    it drifts freely.
     """
     radius, grain = case.fines.radius_range_m[0], case.grains.radius_range_m[1]
     mass = sphere_mass(radius, min(one.density for one in case.fines.components))
@@ -640,6 +561,8 @@ def sticking_of(case: InvasionCase, contact: Contact, push: Push, step: float) -
 
 def sticking_warnings(sticking: Sticking) -> list[Doubt]:
     """Fines that may lock between grains, in words; empty when none do."""
+    if not sticking.by_springs and not sticking.by_integrator:
+        return []
     text = (
         f"fines of 1/{1 / sticking.size_ratio:.3g} of a grain may lock between grains: friction "
         f"{sticking.friction:g} (above the slope {sticking.slope:.2g} of the groove), "
@@ -655,13 +578,11 @@ def sticking_warnings(sticking: Sticking) -> list[Doubt]:
             f"tangential over normal stiffness {sticking.shear_ratio:.2g} (above "
             f"{sticking.friction * sticking.slope:.2g}): {remedy}"
         )
-    elif sticking.by_integrator:
+    else:
         excess = sticking.false_force / MOST_FALSE_FORCE
         text += (
             f"false force of the integrator over the push {sticking.false_force:.2g} (above "
             f"{MOST_FALSE_FORCE:g}): divide run.time_step_factor by {excess:.2g}, or "
             f"run.stiffness_N_m by {excess**2:.2g} as far as overlaps allow"
         )
-    else:
-        return []
     return [Doubt("fines-lock", f"{text}, or lower friction to {sticking.slope:.2g}")]

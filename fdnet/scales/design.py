@@ -32,6 +32,7 @@ from fdnet.sizes import SizeCurve
 Answers = Mapping[str, str]
 ASSUMED = {"mud_d10": 0.5, "mud_d90": 2.0}
 """Diameters of the mud over its median where they are not given."""
+DEFAULTS = {question.key: question.default for question in QUESTIONS}
 
 
 def filled(given: Answers, ask: Callable[[Question, str], str | None] | None) -> dict[str, str]:
@@ -54,12 +55,13 @@ def filled(given: Answers, ask: Callable[[Question, str], str | None] | None) ->
             reply = ask(question, problem)
             if reply is None:
                 ask = None
+            elif not reply and question.default is not None:
+                text, problem = question.default, ""
                 break
-            text, problem = question.read(reply or question.default or "")
-            if not text and question.default is None:
-                problem = f"it needs an answer, as {question.example}"
-            if not reply and question.default is not None:
-                break
+            else:
+                text, problem = question.read(reply)
+                if not text:
+                    problem = f"it needs an answer, as {question.example}"
         answers[question.key] = text or question.default or ""
         if problem:
             problems.append(problem)
@@ -68,8 +70,8 @@ def filled(given: Answers, ask: Callable[[Question, str], str | None] | None) ->
     if missing:
         problems.append(
             f"{len(missing)} answer{'s are' if len(missing) > 1 else ' is'} missing: "
-            f"{', '.join(missing)} (sizes also as "
-            "--sand-file or --mud-file with a CSV table); on a terminal they are asked for"
+            f"{', '.join(missing)} (sizes also as --sand-file or --mud-file with a CSV table); on "
+            "a terminal they are asked for"
         )
     if problems:
         raise CaseError(" | ".join(problems))
@@ -80,19 +82,17 @@ def _assumed(answers: Answers) -> dict[str, float]:
     """The diameters of the mud that are made up from its median, and their factors."""
     if answers.get("mud_file"):
         return {}
-    default = {question.key: question.default for question in QUESTIONS}
-    return {key: factor for key, factor in ASSUMED.items() if answers[key] == default[key]}
+    return {key: factor for key, factor in ASSUMED.items() if answers[key] == DEFAULTS[key]}
 
 
 def _curve(group: str, answers: Answers) -> dict[str, Any]:
     """The table `sizes` of the sand or the mud."""
     if answers.get(f"{group}_file"):
         return {"file": answers[f"{group}_file"]}
-    made_up = {
-        key: f"{factor * converted(answers['mud_d50'], '_um'):g} um"
-        for key, factor in (_assumed(answers) if group == "mud" else {}).items()
-    }
-    texts = {**answers, **made_up}
+    texts = dict(answers)
+    if group == "mud":
+        for key, factor in _assumed(answers).items():
+            texts[key] = f"{factor * converted(answers['mud_d50'], '_um'):g} um"
     return {name: texts[f"{group}_{name.lower()}"] for name in ("D10", "D50", "D90")}
 
 
@@ -101,19 +101,12 @@ def _curve(group: str, answers: Answers) -> dict[str, Any]:
 
 
 class Budget(NamedTuple):
-    """How large a specimen may be, and how long it may take.
+    """How large a specimen may be, and how long it may take."""
 
-    Attributes:
-        name: as --size takes it.
-        width: in mean grain diameters (by volume over surface).
-        length: likewise.
-        seconds: of one core.
-    """
-
-    name: str
-    width: float
-    length: float
-    seconds: float
+    name: str  # as --size takes it
+    width: float  # in mean grain diameters (by volume over surface)
+    length: float  # likewise
+    seconds: float  # of one core
 
 
 BUDGETS = {
@@ -124,46 +117,27 @@ BUDGETS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """What fdnet chose for a case.
+    """What fdnet chose for a case."""
 
-    Attributes:
-        width: m. length: m. sections: their number.
-        sand_cut: percent of the sand left out at the fine end.
-        mud_cut: percent of the solids below the coarse cut.
-        cut: m, diameter from which solids are spheres in LIGGGHTS; 0 where all are.
-        passing: m, diameter up to which solids pass the throats.
-        method: of the invasion, as the case names it.
-    """
-
-    width: float
-    length: float
+    width: float  # m
+    length: float  # m
     sections: int
-    sand_cut: float
-    mud_cut: float
-    cut: float
-    passing: float = 0.0
-    method: str = "liggghts"
+    sand_cut: float  # percent of the sand left out at the fine end
+    mud_cut: float  # percent of the solids below the coarse cut
+    cut: float  # m, diameter from which solids are spheres in LIGGGHTS; 0 where all are
+    passing: float = 0.0  # m, diameter up to which solids pass the throats
+    method: str = "liggghts"  # of the invasion, as the case names it
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Design:
-    """A case with the reasons for its sizes.
+class Design(NamedTuple):
+    """A case with the reasons for its sizes."""
 
-    Attributes:
-        answers: what was given, by key.
-        choice: what fdnet chose.
-        case: the two together.
-        scales: of the case.
-        budget: that the case was fitted to.
-        seconds: expected on one core.
-    """
-
-    answers: Answers
-    choice: Choice
-    case: InvasionCase
-    scales: InvasionScales
-    budget: Budget
-    seconds: float
+    answers: Answers  # what was given, by key
+    choice: Choice  # what fdnet chose
+    case: InvasionCase  # the two together
+    scales: InvasionScales  # of the case
+    budget: Budget  # that the case was fitted to
+    seconds: float  # expected on one core
 
 
 def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
@@ -171,7 +145,6 @@ def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
     kept = {"cut_percent": [1.0, choice.mud_cut]} if choice.mud_cut != 99.0 else {}
     sand = {"cut_percent": [choice.sand_cut, 99.0]} if choice.sand_cut != 1.0 else {}
     known, outer = answers["formation_permeability"], answers["drainage_radius"]
-    usual = {one.key: one.default for one in QUESTIONS}
     solids = "concentration" if answers["solids"].rstrip().endswith("%") else "solids"
     return {
         "name": answers["name"],
@@ -191,7 +164,7 @@ def tables_of(answers: Answers, choice: Choice) -> dict[str, Any]:
         },
         "well": {
             "radius": answers["well_radius"],
-            **({} if outer == usual["drainage_radius"] else {"drainage_radius": outer}),
+            **({} if outer == DEFAULTS["drainage_radius"] else {"drainage_radius": outer}),
             **({"formation_permeability": known} if known else {}),
         },
         "invasion": {"method": choice.method} if choice.method != "liggghts" else {},
@@ -228,14 +201,7 @@ MOST_COARSE = 0.35
 USUAL_SIZES = {"sand_d10": "0.3 mm", "sand_d50": "0.5 mm", "sand_d90": "0.7 mm"}
 USUAL_SIZES |= {"mud_d10": "60 um", "mud_d50": "80 um", "mud_d90": "100 um"}
 USUAL_SIZES |= {"sand_file": "", "mud_file": ""}
-USUAL_CHOICE = Choice(
-    width=5e-3,
-    length=5e-3,
-    sections=1,
-    sand_cut=1.0,
-    mud_cut=99.0,
-    cut=0.0,
-)
+USUAL_CHOICE = Choice(width=5e-3, length=5e-3, sections=1, sand_cut=1.0, mud_cut=99.0, cut=0.0)
 """Sizes and a specimen in which answers that are not about sizes are looked at."""
 
 
@@ -357,7 +323,7 @@ def _clear_cuts(sand: Sizes, mud: Sizes) -> tuple[float, float]:
 def _candidates(first: Choice, curve: SizeCurve) -> Iterator[Choice]:
     """From spheres down to what passes the throats to none; the network takes the others."""
     finest = max(curve.low, first.passing)
-    while _kept_above(curve, finest) >= LEAST_SPHERES:
+    while curve.kept - _share_below(curve, finest) >= LEAST_SPHERES:
         cut = float(f"{finest:.2g}") if finest > curve.low else 0.0
         yield replace(first, cut=cut, method="both" if cut else "liggghts")
         finest *= 1.1
@@ -368,10 +334,7 @@ def _design(answers: Answers, choice: Choice, budget: Budget, folder: Path) -> D
     """The candidate as a case, with its time."""
     case = _case(answers, choice, folder)
     scales = invasion_scales(case)
-    seconds = cost_of(case, scales).seconds
-    return Design(
-        answers=answers, choice=choice, case=case, scales=scales, budget=budget, seconds=seconds
-    )
+    return Design(answers, choice, case, scales, budget, seconds=cost_of(case, scales).seconds)
 
 
 def _case(answers: Answers, choice: Choice, folder: Path) -> InvasionCase:
@@ -385,11 +348,6 @@ def _cut(sizes: Sizes, *, low: float) -> Sizes:
 def _share_below(curve: SizeCurve, diameter: float) -> float:
     """Share of all solids between the fine end of the curve and a diameter, m."""
     return curve.kept * float(curve.share_finer(np.array(min(diameter, curve.high))))
-
-
-def _kept_above(curve: SizeCurve, diameter: float) -> float:
-    """Share of all solids between a diameter, m, and the coarse end of the curve."""
-    return curve.kept - _share_below(curve, diameter)
 
 
 def _up(length: float) -> float:
@@ -432,8 +390,9 @@ def _comment(text: str) -> list[str]:
 
 def _top(design: Design) -> str:
     answers, curve = design.answers, design.case.fines.curve
-    half = "" if curve.below >= 0.5 else um(curve.size_at((0.5 - curve.below) / curve.kept))
-    half = half or answers.get("mud_d50", "")
+    half = answers.get("mud_d50", "")
+    if curve.below < 0.5:
+        half = um(curve.size_at((0.5 - curve.below) / curve.kept))
     return (
         f"A mud of {answers['solids']} solids{f' (half of them below {half})' * bool(half)} at a "
         f"sand of {answers['porosity']} porosity, {answers['overbalance']} over the formation. "
@@ -448,21 +407,15 @@ def _notes(design: Design) -> dict[str, str]:
     grains, mean = case.grains.curve, case.grains.sauter_diameter_m
     throat = throat_width(scales.porosity, scales.permeability)
     notes = {
-        "box.size": (
-            f"Depth, width, width. The width is {choice.width / mean:.2g} mean grains "
-            f"({mm(mean)}), and above two of the largest ({mm(grains.high)}), so that no grain "
-            f"meets itself across the periodic sides. It holds about {grain_count(case)} grains. "
-            f"The depth is {choice.length / mean:.2g} grains."
-        ),
-        "analysis.sections": (
-            f"Slabs by depth of {mm(choice.length / choice.sections)}, "
-            f"about {SECTION:g} grains each: thinner ones show single throats."
-        ),
-        "well.radius": (
-            "The overbalance is lost in radial flow around the well, from its face to the "
-            f"drainage radius ({design.answers['drainage_radius']}): the mud moves at "
-            f"{scales.interstitial_velocity:.2g} m/s in the pores."
-        ),
+        "box.size": f"Depth, width, width. The width is {choice.width / mean:.2g} mean grains "
+        f"({mm(mean)}), and above two of the largest ({mm(grains.high)}), so that no grain meets "
+        f"itself across the periodic sides. It holds about {grain_count(case)} grains. The depth "
+        f"is {choice.length / mean:.2g} grains.",
+        "analysis.sections": f"Slabs by depth of {mm(choice.length / choice.sections)}, "
+        f"about {SECTION:g} grains each: thinner ones show single throats.",
+        "well.radius": "The overbalance is lost in radial flow around the well, from its face to "
+        f"the drainage radius ({design.answers['drainage_radius']}): the mud moves at "
+        f"{scales.interstitial_velocity:.2g} m/s in the pores.",
         "fines.sizes": f"The throats of the sand are some {um(throat)} wide.",
     }
     if choice.sand_cut > 1.0:

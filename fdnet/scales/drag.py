@@ -32,21 +32,6 @@ MOST_CROWD_REYNOLDS = 1000.0
 """Reynolds number (superficial slip, Sauter mean diameter) up to which the law was fitted."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Crowd:
-    """What surrounds a sphere. Each value is a number or an array (N,) with one entry a sphere.
-
-    Attributes:
-        porosity: volume fraction of the fluid around it, above 0 and at most 1.
-        size_ratio: its diameter over the Sauter mean diameter of all spheres around it.
-        reynolds: rho_f phi |u - v| d / mu with the slip u - v and the Sauter mean diameter d.
-    """
-
-    porosity: Array | float
-    size_ratio: Array | float = 1.0
-    reynolds: Array | float = 0.0
-
-
 def bed_factor(porosity: Array | float, reynolds: Array | float = 0.0) -> Array:
     """F of spheres of one size: drag without the gradient's force over 3 pi mu d U.
 
@@ -57,15 +42,15 @@ def bed_factor(porosity: Array | float, reynolds: Array | float = 0.0) -> Array:
     below 0 or above `MOST_CROWD_REYNOLDS`.
     """
     phi, moving = np.asarray(porosity, float), np.asarray(reynolds, float)
-    range_of_law = f"0 to {MOST_CROWD_REYNOLDS:g}, the range of the law"
+    most = f"0 to {MOST_CROWD_REYNOLDS:g}"
     for name, value, good, expected in (
         ("porosity", phi, (phi > 0) & (phi <= 1), "above 0 and at most 1"),
-        ("Reynolds number", moving, (moving >= 0) & (moving <= MOST_CROWD_REYNOLDS), range_of_law),
+        ("Reynolds number", moving, (moving >= 0) & (moving <= MOST_CROWD_REYNOLDS), most),
     ):
         if not np.all(good):
             raise CaseError(
-                f"drag in a crowd: {name} {value[~good].flat[0]:.4g}, expected {expected}; take "
-                "another law of drag"
+                f"drag in a crowd: {name} {value[~good].flat[0]:.4g}, expected {expected}, the "
+                "range of the law; take another law of drag"
             )
     solid = 1 - phi
     creeping = 10 * solid / phi**2 + phi**2 * (1 + 1.5 * np.sqrt(solid))
@@ -85,14 +70,17 @@ def size_factor(porosity: Array | float, size_ratio: Array | float) -> Array:
     return np.asarray(phi * ratio + (1 - phi) * ratio**2)
 
 
-def crowd_drag_factor(crowd: Crowd) -> Array:
+def crowd_drag_factor(
+    porosity: Array | float, size_ratio: Array | float = 1.0, reynolds: Array | float = 0.0
+) -> Array:
     """All that the fluid does to spheres over Stokes's drag on lone ones, 6 pi mu r u; (N,).
 
-    u is the interstitial velocity of the fluid at the sphere. It is 1 for a lone sphere that
-    creeps. Raises CaseError as `bed_factor` does.
+    u is the interstitial velocity of the fluid at the sphere. The factor is 1 for a lone sphere
+    that creeps. Each argument is a number or one a sphere, (N,): the volume fraction of the fluid
+    around it, its diameter over the Sauter mean diameter d around it, and
+    rho_f phi |u - v| d / mu with the slip u - v. Raises CaseError as `bed_factor` does.
     """
-    bed = bed_factor(crowd.porosity, crowd.reynolds)
-    return size_factor(crowd.porosity, crowd.size_ratio) * bed
+    return size_factor(porosity, size_ratio) * bed_factor(porosity, reynolds)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -209,19 +197,13 @@ def throat_width(porosity: float, permeability: float) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Push:
-    """The forces on a fine in the pack, as the case asks for them.
+    """The forces on a fine in the pack, as the case asks for them."""
 
-    Attributes:
-        coefficient: 6 pi mu M, Pa s: Stokes's drag over radius and slip.
-        velocity: of the fluid in the pores, m/s.
-        gradient: fall of pressure with x that acts on fines, Pa/m; 0 where it is left out.
-        reynolds_slope: Reynolds number over radius and slip, 2 rho_f / mu, s/m2; 0 where drag is
-            Stokes's at any speed.
-    """
-
-    coefficient: float
-    velocity: float
-    gradient: float
+    coefficient: float  # 6 pi mu M, Pa s: Stokes's drag over radius and slip
+    velocity: float  # of the fluid in the pores, m/s
+    gradient: float  # fall of pressure with x that acts on fines, Pa/m; 0 where it is left out
+    # Reynolds number over radius and slip, 2 rho_f / mu, s/m2; 0 where drag is Stokes's at any
+    # speed
     reynolds_slope: float
 
     def gradient_force(self, radius: float) -> float:
@@ -302,10 +284,8 @@ def reynolds_warnings(
 ) -> list[Doubt]:
     """Drag at the Reynolds number of the largest fine that is held; empty where Stokes's holds.
 
-    `throat_ratio` is its diameter over that of the throats: it says whether the drag matters. Six
-    times the force moved no count of fines of 1/3 of a grain beyond chance; of fines of 1/10 more
-    passed, and they went deeper (docs/physics.md, section 3). A case in which the slip of a fine
-    at rest is beyond Schiller and Naumann's correlation is refused (`drag_factor`).
+    `throat_ratio` is its diameter over that of the throats: six times the force moved no count of
+    fines of 1/3 of a grain; of fines of 1/10 more passed (docs/physics.md, section 3).
     """
     if case.drag.inertia != "none":
         fastest = reynolds * push.largest_slip(case.fines.radius_range_m[1]) / push.velocity
@@ -320,15 +300,15 @@ def reynolds_warnings(
     if reynolds > MOST_REYNOLDS:
         text += f" and of Schiller and Naumann's (below {MOST_REYNOLDS:g})"
     else:
-        matters = "here: such narrow fines would go deeper with it"
-        if throat_ratio >= BRIDGING:
-            matters = "little here: such wide fines stop where they no longer fit"
+        matters = "little here: such wide fines stop where they no longer fit"
+        if throat_ratio < BRIDGING:
+            matters = "here: such narrow fines would go deeper with it"
+        scheme = "" if case.drag.scheme == "held" else ' with drag.scheme = "held"'
         text += (
             f": the drag on a fine at rest is {drag_factor(reynolds):.3g} times as large by "
-            f'Schiller and Naumann, which matters {matters}; set drag.inertia = "schiller-naumann"'
+            f"Schiller and Naumann, which matters {matters}; set drag.inertia = "
+            f'"schiller-naumann"{scheme}'
         )
-        if case.drag.scheme != "held":
-            text += ' with drag.scheme = "held"'
     return [Doubt("reynolds-number", text)]
 
 
@@ -340,20 +320,14 @@ def throat_warnings(case: InvasionCase, ratio: float) -> list[Doubt]:
     """
     if case.drag.coupled:
         return []
+    what = "it closes them, and there the pressure drop across it is its force, not this drag"
+    if ratio <= MOST_RATIO:
+        factor = held_factor(ratio)
+        if factor < THROAT_FACTOR:
+            return []
+        what = f"at rest on the axis of one it feels {factor:.2g} times the drag of a lone sphere"
     text = (
         f"the largest fine ({2e3 * case.fines.radius_range_m[1]:.3g} mm) is {ratio:.2g} of the "
-        "width of the throats (tubes of the pack's permeability): "
+        f"width of the throats (tubes of the pack's permeability): {what}"
     )
-    if ratio > MOST_RATIO:
-        text += (
-            "it closes them, and there the pressure drop across it is its force, not the drag of "
-            "a lone sphere"
-        )
-    elif (factor := held_factor(ratio)) >= THROAT_FACTOR:
-        text += (
-            f"at rest on the axis of one it feels {factor:.2g} times the drag of a lone sphere, "
-            "by which the drag is too small there"
-        )
-    else:
-        return []
     return [Doubt("walls-of-a-throat", text)]

@@ -14,28 +14,18 @@ ERGUN_RATIO = ERGUN_INERTIAL / ERGUN_VISCOUS
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Path:
-    """The way on which the overbalance is lost, as the lengths that count for each loss.
+    """The way on which the overbalance is lost, as the lengths that count for each loss."""
 
-    Attributes:
-        viscous: m, the integral of q(s) / q over the way; q is the velocity at the face.
-        inertial: m, the integral of (q(s) / q)^2.
-    """
-
-    viscous: float
-    inertial: float
+    viscous: float  # m, the integral of q(s) / q over the way; q is the velocity at the face
+    inertial: float  # m, the integral of (q(s) / q)^2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Losses:
-    """Pressure gradient viscous q + inertial q^2 of a Darcy velocity q (Forchheimer 1901).
+    """Pressure gradient viscous q + inertial q^2 of a Darcy velocity q (Forchheimer 1901)."""
 
-    Attributes:
-        viscous: Pa s/m2, viscosity over permeability.
-        inertial: Pa s2/m3; 0 by Darcy's law.
-    """
-
-    viscous: float
-    inertial: float = 0.0
+    viscous: float  # Pa s/m2, viscosity over permeability
+    inertial: float = 0.0  # Pa s2/m3; 0 by Darcy's law
 
     def gradient(self, velocity: float) -> float:
         """Pressure gradient, Pa/m, of a Darcy velocity in m/s."""
@@ -59,9 +49,8 @@ def carman_kozeny(porosity: float, diameter: float) -> float:
 def ergun_inertia(permeability: float, porosity: float, diameter: float, density: float) -> float:
     """Inertial coefficient in Pa s2/m3: Ergun's share of the viscous loss of this permeability.
 
-    For a bed of `permeability` m2 and `diameter` m of its grains, and a fluid of `density` kg/m3.
-    Ergun's own bed has the permeability d^2 phi^3 / (150 (1 - phi)^2). The ratio of his two losses
-    is kept, so that the viscous one is that of the permeability in use.
+    `permeability` m2, `diameter` m of the grains, `density` kg/m3 of the fluid. The ratio of his
+    two losses is kept, so that the viscous one is that of the permeability in use.
     """
     return ERGUN_RATIO * density * diameter / (permeability * (1 - porosity))
 
@@ -93,22 +82,14 @@ USUAL_WELL = (0.108, 100.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Velocity:
-    """Velocity of the fluid along x.
+    """Velocity of the fluid along x."""
 
-    Attributes:
-        permeability: m2, of the intact pack by Carman and Kozeny.
-        darcy: m/s, flow rate over the whole cross-section.
-        interstitial: m/s, mean velocity in the pores.
-        pressure_gradient: Pa/m, that drives this flow through the pack.
-        inertial_loss: share by which Ergun's inertial term lowers the velocity of Darcy's law at
-            the same overbalance; where the velocity is given, at the gradient that Darcy's law
-            needs for it.
-    """
-
-    permeability: float
-    darcy: float
-    interstitial: float
-    pressure_gradient: float
+    permeability: float  # m2, of the intact pack by Carman and Kozeny
+    darcy: float  # m/s, flow rate over the whole cross-section
+    interstitial: float  # m/s, mean velocity in the pores
+    pressure_gradient: float  # Pa/m, that drives this flow through the pack
+    # share by which Ergun's inertial term lowers the velocity of Darcy's law at the same
+    # overbalance; where the velocity is given, at the gradient that Darcy's law needs for it
     inertial_loss: float
 
 
@@ -141,15 +122,13 @@ def darcy_through(case: Case, porosity: float, permeability: float) -> float:
     case gives that of the formation.
     """
     given = None if case.well is None else case.well.formation_permeability_m2
-    path = path_of(case)
     own, around = (
         _by_law(case, _losses(case, porosity, one))
         for one in (permeability, given or permeability)
     )
-    near = Path(
-        viscous=min(case.size_m[0], path.viscous), inertial=min(case.size_m[0], path.inertial)
-    )
-    viscous, inertial = near.viscous / path.viscous, near.inertial / path.inertial
+    path, length = path_of(case), case.size_m[0]
+    viscous = min(length, path.viscous) / path.viscous
+    inertial = min(length, path.inertial) / path.inertial
     mean = Losses(
         viscous=own.viscous * viscous + around.viscous * (1 - viscous),
         inertial=own.inertial * inertial + around.inertial * (1 - inertial),
@@ -158,10 +137,7 @@ def darcy_through(case: Case, porosity: float, permeability: float) -> float:
 
 
 def driving_pressure(case: Case, gradient: float) -> float:
-    """Pressure, Pa, that drives the fluid: over its whole way, or over the specimen alone.
-
-    The latter is the `gradient`, Pa/m, times the length, where the case gives a velocity.
-    """
+    """The overbalance, Pa; where the case gives a velocity, `gradient` Pa/m times the length."""
     given = case.fluid.velocity_m_s
     return case.fluid.overbalance_Pa if given is None else gradient * case.size_m[0]
 
@@ -199,9 +175,9 @@ def velocity_warnings(case: InvasionCase, porosity: float, velocity: Velocity) -
             "overbalance-over-the-box",
             f"the whole overbalance is lost over the {1e3 * case.size_m[0]:.3g} mm of the box "
             f"({gradient:.3g} MPa/m), which gives the fluid {velocity.interstitial:.3g} m/s; at "
-            f"the face of a well of {1e3 * radius:.0f} mm with a drainage radius of {outer:.0f} m "
-            f"it would be {at_well:.2g} m/s: add the table [well] with radius_mm and "
-            "drainage_radius_m, or give fluid.darcy_length_mm for a plug, or fluid.velocity_m_s",
+            f"the face of a well of {1e3 * radius:.0f} mm it would be {at_well:.2g} m/s: add the "
+            "table [well] with radius_mm, or give fluid.darcy_length_mm for a plug, or "
+            "fluid.velocity_m_s",
         )
     loss, darcy = velocity.inertial_loss, fluid.darcy_law == "darcy"
     if loss >= INERTIA_WARNING and darcy and fluid.velocity_m_s is None:
@@ -232,45 +208,32 @@ _ROUNDING = 1 + 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drive:
-    """How fast the simulated fluid moves.
+    """How fast the simulated fluid moves."""
 
-    Attributes:
-        velocity: m/s, in the pores.
-        factor: velocity over the fluid's own: the factor on all forces on a fine, and physical
-            time over simulated time.
-        impact_stokes: impact Stokes number of the largest fine, free in this fluid.
-    """
-
-    velocity: float
+    velocity: float  # m/s, in the pores
+    # velocity over the fluid's own: the factor on all forces on a fine, and physical time over
+    # simulated time
     factor: float
-    impact_stokes: float
+    impact_stokes: float  # impact Stokes number of the largest fine, free in this fluid
 
 
 def impact_stokes(relaxation_time: float, velocity: float, radius: float) -> float:
     """tau v / r = m v / (6 pi mu r^2): the way on which drag stops a sphere, over its radius.
 
-    For the drag relaxation time in s, the velocity of the sphere in m/s and its radius in m
-    (Joseph and others, J. Fluid Mech. 433, 329, 2001).
+    Source: Joseph and others, J. Fluid Mech. 433, 329 (2001).
     """
     return relaxation_time * velocity / radius
 
 
 def drive_of(case: InvasionCase, velocity: float, relaxation_time: float, free: float) -> Drive:
-    """The velocity that the case asks for, or the fluid's own.
+    """The velocity that the case asks for, or the fluid's own `velocity` in the pores, m/s.
 
     "auto" never drives slower than the fluid moves, and not where fines cohere: cohesion is not
-    scaled with the forces of the fluid.
+    scaled with the forces of the fluid. `relaxation_time` s is that of the largest fine, `free`
+    its velocity in this fluid, m/s: faster where a pressure gradient pushes it.
 
-    Args:
-        case: the case.
-        velocity: of the fluid in the pores, m/s.
-        relaxation_time: of the largest fine, s.
-        free: velocity of a free fine in this fluid, m/s: faster where a pressure gradient pushes
-            it.
-
-    Raises:
-        CaseError: a driven case whose impact Stokes number is above `STOKES_LIMIT`, as simulated
-            or at the fluid's own velocity.
+    Raises CaseError for a driven case whose impact Stokes number is above `STOKES_LIMIT`, as
+    simulated or at the fluid's own velocity.
     """
     asked, driven = case.drag.drive_velocity_m_s, velocity
     own = impact_stokes(relaxation_time, free, case.fines.radius_range_m[1])
@@ -278,18 +241,15 @@ def drive_of(case: InvasionCase, velocity: float, relaxation_time: float, free: 
         driven = velocity * max(1.0, AUTO_STOKES / own)
     elif not isinstance(asked, str):
         driven = asked
-    stokes, given = own * (driven / velocity), not isinstance(asked, str)
-    if given and own > STOKES_LIMIT * _ROUNDING:
+    stokes = own * (driven / velocity)
+    if not isinstance(asked, str) and max(own, stokes) > STOKES_LIMIT * _ROUNDING:
+        do = "leave the key out"
+        if own <= STOKES_LIMIT * _ROUNDING:
+            do = f"expected at most {driven * STOKES_LIMIT / stokes:.2g} m/s"
         raise CaseError(
-            f"drag.drive_velocity_m_s: the impact Stokes number of the fines is {own:.2g} "
-            f"in the fluid itself (limit {STOKES_LIMIT:g}), so their inertia matters and no other "
-            "velocity gives the same result; leave the key out"
-        )
-    if given and stokes > STOKES_LIMIT * _ROUNDING:
-        raise CaseError(
-            f"drag.drive_velocity_m_s: {driven:g} m/s makes the impact Stokes number "
-            f"{stokes:.2g} (limit {STOKES_LIMIT:g}): the fines' inertia would "
-            f"matter; expected at most {driven * STOKES_LIMIT / stokes:.2g} m/s"
+            f"drag.drive_velocity_m_s: at {driven:g} m/s the impact Stokes number of the fines is "
+            f"{stokes:.2g}, in the fluid itself {own:.2g} (limit {STOKES_LIMIT:g}): their inertia "
+            f"would matter; {do}"
         )
     return Drive(velocity=driven, factor=driven / velocity, impact_stokes=stokes)
 

@@ -138,24 +138,22 @@ def size_warnings(case: Case) -> Iterator[Doubt]:
                     f"{key}: the {sizes.fit.name} curve misses {missed}; give the measured curve "
                     "(size and passing, or a file) if it matters",
                 )
-        curve = spheres.curve
-        below = curve.below
-        if isinstance(spheres, Fines) and isinstance(case, InvasionCase):
-            below *= not (case.with_classes or case.by_classes)
+        curve, below, thinner = spheres.curve, spheres.curve.below, ""
+        if isinstance(spheres, Fines):
+            if by_classes:
+                continue
+            below *= not isinstance(case, InvasionCase) or not case.with_classes
+            thinner = (
+                f"; the mud carries {100 * spheres.placed_fraction:.3g} % of solids by volume "
+                f"instead of {100 * spheres.volume_fraction:.3g} %"
+            )
         ends = ((below, "finer", curve.low), (curve.above, "coarser", curve.high))
         parts = [
             f"{100 * share:.3g} % of the solids ({side} than {1e6 * size:.3g} um)"
             for share, side, size in ends
             if share > MOST_TAIL
         ]
-        if parts and not (isinstance(spheres, Fines) and by_classes):
-            thinner = ""
-            if isinstance(spheres, Fines):
-                whole, placed = spheres.volume_fraction, spheres.placed_fraction
-                thinner = (
-                    f"; the mud carries {100 * placed:.3g} % of solids by volume instead of "
-                    f"{100 * whole:.3g} %"
-                )
+        if parts:
             yield Doubt("sizes-left-out", f"{name}: {' and '.join(parts)} are left out{thinner}")
     porosity = case.grains.porosity
     if case.grains.measured and case.grains.count is None and porosity is not None:

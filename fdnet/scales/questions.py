@@ -8,24 +8,15 @@ from fdnet.case.units import converted, share_of
 
 
 class Question(NamedTuple):
-    """One thing to ask for.
+    """One thing to ask for."""
 
-    Attributes:
-        key: of the option, "sand_d50" for --sand-d50.
-        text: what is asked on a terminal.
-        example: a value, which is the default where there is one.
-        default: the value of an empty answer; None where an answer is needed.
-        group: questions of one group may be answered by a file instead.
-        unit: end of a case's key in whose unit it is read; "%" for a share, "%_kg_m3" for a share
-            or a mass.
-    """
-
-    key: str
-    text: str
-    example: str
+    key: str  # of the option, "sand_d50" for --sand-d50
+    text: str  # what is asked on a terminal
+    example: str  # a value, which is the default where there is one
+    # the case's unit in which it is read; "%" for a share, "%_kg_m3" for a share or a mass
     unit: str = "_mm"
-    default: str | None = None
-    group: str = ""
+    default: str | None = None  # the value of an empty answer; None where an answer is needed
+    group: str = ""  # questions of one group may be answered by a file instead
 
     @property
     def option(self) -> str:
@@ -43,9 +34,9 @@ class Question(NamedTuple):
                 text = f"{100 * float(text):g} %" if 0 < float(text) < 1 else text
         if text in ("", self.default):
             return text, ""
-        _, _, suffix = self.unit.rpartition("%")
+        suffix = self.unit.removeprefix("%")
         try:
-            if "%" in self.unit and (not suffix or text.rstrip().endswith("%")):
+            if "%" in self.unit and (not suffix or text.endswith("%")):
                 share_of(text)
             else:
                 converted(text, suffix)

@@ -43,90 +43,57 @@ MOST_STEPS = 2**31 - 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scales:
-    """What follows from any case, in SI units.
+    """What follows from any case, in SI units."""
 
-    Attributes:
-        porosity: of the pack, as the case asks for it.
-        permeability: m2, of the intact pack by Carman and Kozeny.
-        darcy_velocity: m/s, flow rate over the whole cross-section.
-        interstitial_velocity: m/s, mean velocity of the fluid in the pores.
-        pressure_gradient: Pa/m, that drives this flow through the intact pack.
-        inertial_loss: share by which Ergun's inertial term lowers the velocity of Darcy's law.
-        stiffness_factor: factor from the materials' stiffness, or moduli, to those used.
-        contacts: contact of each pair of materials, such as "grain-fine".
-        warnings: doubts about the case, one sentence each.
-    """
-
-    porosity: float
-    permeability: float
-    darcy_velocity: float
-    interstitial_velocity: float
-    pressure_gradient: float
-    inertial_loss: float
-    stiffness_factor: float
-    contacts: dict[str, Contact]
-    warnings: tuple[Doubt, ...] = ()
+    porosity: float  # of the pack, as the case asks for it
+    permeability: float  # m2, of the intact pack by Carman and Kozeny
+    darcy_velocity: float  # m/s, flow rate over the whole cross-section
+    interstitial_velocity: float  # m/s, mean velocity of the fluid in the pores
+    pressure_gradient: float  # Pa/m, that drives this flow through the intact pack
+    inertial_loss: float  # share by which Ergun's inertial term lowers the velocity of Darcy's law
+    stiffness_factor: float  # factor from the materials' stiffness, or moduli, to those used
+    contacts: dict[str, Contact]  # contact of each pair of materials, such as "grain-fine"
+    warnings: tuple[Doubt, ...] = ()  # doubts about the case, one sentence each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InvasionScales(Scales):
-    """What follows from a case with fines as well, in SI units.
+    """What follows from a case with fines as well, in SI units."""
 
-    Attributes:
-        drive_velocity: m/s, of the fluid in the pores as simulated; the fluid's own unless
-            `drag.drive_velocity_m_s` says otherwise.
-        force_factor: drive velocity over the fluid's own; the factor on all forces on a fine, and
-            physical time over simulated time.
-        upstream_velocity: m/s, upstream of the formation face, as simulated.
-        supplied_count: number of fines in the slab; the most that come where the mud has no end.
-        slab_length: m, along the flow.
-        relaxation_time: s, of the drag on the smallest and on the largest fine.
-        time_step: s, of the invasion.
-        hold_steps: steps for which the drag is held.
-        plug_time: s of the simulation without a crossing after which the face counts as plugged.
-        cap_time: s of the simulation, when the invasion ends at the latest.
-        checkpoint_steps: steps between two checkpoints.
-        reynolds: particle Reynolds number of the largest fine that is held.
-        stokes: Stokes number of the largest fine at a grain, as simulated.
-        impact_stokes: impact Stokes number of the largest fine, as simulated.
-        gravity_over_drag: weight less buoyancy over drag, of the largest fine.
-        gradient_over_drag: force of the pack's pressure gradient over Stokes's drag, of the
-            largest fine at rest, whether or not the case lets it act.
-        push: drag and pressure gradient on fines in the pack, as simulated.
-        drift_velocity: m/s, of the largest fine that the fluid carries freely in the pores, as
-            simulated.
-        throat_ratio: diameter of the largest fine over that of the pack's throats.
-        impact_overlap: predicted overlap by impact, over the diameter of the largest fine.
-        drag_overlap: predicted overlap by drag and pressure gradient, over the diameter of the
-            largest fine.
-        deposit_overlap: where the flow follows the deposit, predicted overlap of fines that hold
-            the whole pressure, over the diameter of the largest one; else 0.
-        sticking: how far a fine may lock between two grains.
-    """
-
+    # m/s, of the fluid in the pores as simulated; the fluid's own unless `drag.drive_velocity_m_s`
+    # says otherwise.
     drive_velocity: float
+    # drive velocity over the fluid's own; the factor on all forces on a fine, and physical time
+    # over simulated time
     force_factor: float
-    upstream_velocity: float
-    supplied_count: int
-    slab_length: float
-    relaxation_time: tuple[float, float]
-    time_step: float
-    hold_steps: int
+    upstream_velocity: float  # m/s, upstream of the formation face, as simulated
+    supplied_count: int  # number of fines in the slab; the most that come where the mud has no end
+    slab_length: float  # m, along the flow
+    relaxation_time: tuple[float, float]  # s, of the drag on the smallest and on the largest fine
+    time_step: float  # s, of the invasion
+    hold_steps: int  # steps for which the drag is held
+    # s of the simulation without a crossing after which the face counts as plugged
     plug_time: float
-    cap_time: float
-    checkpoint_steps: int
-    reynolds: float
-    stokes: float
-    impact_stokes: float
-    gravity_over_drag: float
+    cap_time: float  # s of the simulation, when the invasion ends at the latest
+    checkpoint_steps: int  # steps between two checkpoints
+    reynolds: float  # particle Reynolds number of the largest fine that is held
+    stokes: float  # Stokes number of the largest fine at a grain, as simulated
+    impact_stokes: float  # impact Stokes number of the largest fine, as simulated
+    gravity_over_drag: float  # weight less buoyancy over drag, of the largest fine
+    # force of the pack's pressure gradient over Stokes's drag, of the largest fine at rest,
+    # whether or not the case lets it act
     gradient_over_drag: float
-    push: Push
+    push: Push  # drag and pressure gradient on fines in the pack, as simulated
+    # m/s, of the largest fine that the fluid carries freely in the pores, as simulated
     drift_velocity: float
-    throat_ratio: float
-    impact_overlap: float
+    throat_ratio: float  # diameter of the largest fine over that of the pack's throats
+    impact_overlap: float  # predicted overlap by impact, over the diameter of the largest fine
+    # predicted overlap by drag and pressure gradient, over the diameter of the largest fine
     drag_overlap: float
+    # where the flow follows the deposit, predicted overlap of fines that hold the whole pressure,
+    # over the diameter of the largest one; else 0
     deposit_overlap: float
-    sticking: Sticking
+    sticking: Sticking  # how far a fine may lock between two grains
 
     @property
     def stiffness(self) -> float:
@@ -219,10 +186,12 @@ def _invasion(
     if case.drag.upstream == "darcy":
         upstream = flow.darcy * drive.factor
     shortest = relaxation[0] * push.relaxation_share(small)
-    step = time_step(case, shared.contacts, shortest)
     times = stop_times(case, slab, drive, upstream=upstream)
-    hold = hold_steps(case, step, shortest, times.chunk)
-    chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
+    step, hold, chunk_steps = times.chunk, 1, 1
+    if not case.by_classes:  # which has no steps of LIGGGHTS, and no limits on them
+        step = time_step(case, shared.contacts, shortest)
+        hold = hold_steps(case, step, shortest, times.chunk)
+        chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
     borne = deposit_pressure(case, flow, shared.porosity)
     overlaps = overlaps_of(case, contact, flow, drive, shared.porosity, chain * borne)
@@ -236,6 +205,8 @@ def _invasion(
     displaced = fluid.density_kg_m3 * case.gravity.buoyancy
     excess = max(abs(one.density - displaced) for one in fines.components)
     weight = math.hypot(*case.gravity.acceleration_m_s2) * excess
+    # 2 r^2 (-grad p) / (9 mu u M), by Darcy's law (2/9) r^2 phi / (k M)
+    pushed = 2 / 9 * large**2 * flow.pressure_gradient
     warnings = [*shared.warnings, *velocity_warnings(case, shared.porosity, flow)]
     if not case.by_classes:
         warnings += [
@@ -268,12 +239,7 @@ def _invasion(
         impact_stokes=drive.impact_stokes,
         # 2 r^2 (rho - rho_fluid) g / (9 mu u M), of the material that weighs most in the fluid
         gravity_over_drag=2 * large**2 * weight / (9 * viscosity * speed * multiplier),
-        # 2 r^2 (-grad p) / (9 mu u M), by Darcy's law (2/9) r^2 phi / (k M)
-        gradient_over_drag=2
-        / 9
-        * large**2
-        * flow.pressure_gradient
-        / (viscosity * speed * multiplier),
+        gradient_over_drag=pushed / (viscosity * speed * multiplier),
         push=push,
         drift_velocity=drive.velocity + push.drift(large),
         throat_ratio=throat,
@@ -297,20 +263,13 @@ MOST_PASSAGES = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BackFlow:
-    """A clean-up in numbers. Times and velocities are those of the simulation.
+    """A clean-up in numbers. Times and velocities are those of the simulation."""
 
-    Attributes:
-        case: the case of the invasion with the drawdown for the overbalance.
-        scales: of that case; its velocities are positive.
-        choices: the table [clean_up].
-        chunks: most chunks of `scales.checkpoint_steps` steps.
-        quiet_chunks: chunks without a fine that comes out which end it; 0 where it has a duration.
-    """
-
-    case: InvasionCase
-    scales: InvasionScales
-    choices: CleanUp
-    chunks: int
+    case: InvasionCase  # the case of the invasion with the drawdown for the overbalance
+    scales: InvasionScales  # of that case; its velocities are positive
+    choices: CleanUp  # the table [clean_up]
+    chunks: int  # most chunks of `scales.checkpoint_steps` steps.
+    # chunks without a fine that comes out which end it; 0 where it has a duration
     quiet_chunks: int
 
     @property
@@ -335,7 +294,7 @@ def back_flow(case: InvasionCase) -> BackFlow:
         raise CaseError(f"clean_up.drawdown_MPa: {given:g}: {error}") from error
     chunk = scales.checkpoint_steps * scales.time_step * scales.force_factor
     passage = case.size_m[0] / scales.drive_velocity * scales.force_factor
-    longest = choices.duration_s or choices.cap_s or MOST_PASSAGES * passage
+    longest = choices.duration_s or MOST_PASSAGES * passage
     chunks = longest / chunk
     timed = choices.duration_s is not None
     return BackFlow(
@@ -343,7 +302,7 @@ def back_flow(case: InvasionCase) -> BackFlow:
         scales=scales,
         choices=choices,
         chunks=max(1, round(chunks) if timed else math.ceil(chunks - 1e-9)),
-        quiet_chunks=0 if timed else max(1, math.ceil((choices.quiet_s or passage) / chunk)),
+        quiet_chunks=0 if timed else max(1, math.ceil(passage / chunk)),
     )
 
 
@@ -352,7 +311,9 @@ def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
 
     What its table [run] says of the length of the invasion is that of the clean-up.
     """
-    fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
+    own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
+    run = case.run.model_copy(update=own | {"duration_ms": choices.duration_ms})
+    fluid = case.fluid.model_copy(update={"overbalance_MPa": choices.drawdown_MPa})
     turned, asked = case.model_copy(update={"fluid": fluid, "run": run}), case.drag
     if asked.drive_velocity_m_s != "fluid":
         porosity = target_porosity(case)

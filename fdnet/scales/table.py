@@ -11,34 +11,23 @@ from fdnet.scales.contacts import (
     LARGEST_CHAIN,
     Contact,
     least_restitution,
-    material_of,
     pull_off_of,
-    rayleigh_time,
 )
-from fdnet.scales.cost import cost_of, memory_bytes
+from fdnet.scales.cost import cost_of, peak_memory
 from fdnet.scales.drag import MOST_RATIO, held_factor
 from fdnet.scales.pack import SHARES, curves_of, diameter_at, grain_count
 from fdnet.scales.scales import InvasionScales, Scales
 
 
 class Quantity(NamedTuple):
-    """One row of the table of scales.
+    """One row of the table of scales."""
 
-    Attributes:
-        name: what it is, in words.
-        symbol: as in the formulas.
-        value: in `unit`.
-        unit: SI; "-" for a number without a unit.
-        formula: how it follows from the case.
-        source: author and year, or where it was measured.
-    """
-
-    name: str
-    symbol: str
-    value: float
-    unit: str
-    formula: str
-    source: str
+    name: str  # what it is, in words
+    symbol: str  # as in the formulas
+    value: float  # in `unit`
+    unit: str  # SI; "-" for a number without a unit
+    formula: str  # how it follows from the case
+    source: str  # author and year, or where it was measured
 
 
 @cache
@@ -56,19 +45,15 @@ def row(key: str, value: float, **words: Any) -> Quantity:
 
 def scale_rows(case: Case, scales: Scales) -> list[Quantity]:
     """Every scale of the case with its formula and source, in reading order."""
-    rows = [*_size_rows(case), *_flow_rows(case, scales)]
+    rows, cost = [*_size_rows(case), *_flow_rows(case, scales)], cost_of(case, scales)
+    invaded = isinstance(scales, InvasionScales) and isinstance(case, InvasionCase)
     if isinstance(scales, InvasionScales) and isinstance(case, InvasionCase):
         rows += _fine_rows(case, scales)
-    cost = cost_of(case, scales)
-    rows += [
-        *_contact_rows(case, scales),
-        row("grains", grain_count(case)),
-        row("pack_time", cost.pack_seconds),
-        row("memory", memory_bytes(case, scales)),
-    ]
-    if isinstance(scales, InvasionScales):
-        rows.append(row("run_time", cost.invade_seconds))
-    return rows
+    if not (isinstance(case, InvasionCase) and case.by_classes):
+        rows += _contact_rows(case, scales)
+    rows += [row("grains", grain_count(case)), row("pack_time", cost.pack_seconds)]
+    rows.append(row("memory", peak_memory(case, scales)))
+    return [*rows, row("run_time", cost.invade_seconds)] if invaded else rows
 
 
 _SOURCES = {
@@ -129,7 +114,8 @@ def _fine_rows(case: InvasionCase, scales: InvasionScales) -> Iterator[Quantity]
         {"smallest": low, "largest": high}.items() if low != high else [("every", low)]
     ):
         yield row("relaxation", tau, name=name)
-    yield row("held", scales.hold_steps * scales.time_step / low)
+    if not case.by_classes:
+        yield row("held", scales.hold_steps * scales.time_step / low)
     yield row("reynolds", scales.reynolds)
     yield row("stokes", scales.stokes)
     yield row("impact_stokes", scales.impact_stokes)
@@ -139,18 +125,18 @@ def _fine_rows(case: InvasionCase, scales: InvasionScales) -> Iterator[Quantity]
     yield row("throat", scales.throat_ratio)
     if scales.throat_ratio <= MOST_RATIO:  # a wider fine closes the throat
         yield row("throat_drag", held_factor(scales.throat_ratio))
-    yield row(f"{case.contact.model}_impact", scales.impact_overlap)
-    yield row(f"{case.contact.model}_drag", scales.drag_overlap)
-    if case.drag.coupled:
-        yield row("deposit", scales.deposit_overlap, chain=LARGEST_CHAIN)
-    endless = isinstance(case, InvasionCase) and case.fines.endless
-    most = ", at most" if endless else ""
+    if not case.by_classes:
+        yield row(f"{case.contact.model}_impact", scales.impact_overlap)
+        yield row(f"{case.contact.model}_drag", scales.drag_overlap)
+        if case.drag.coupled:
+            yield row("deposit", scales.deposit_overlap, chain=LARGEST_CHAIN)
+        yield row("time_step", scales.time_step)
+    most = ", at most" * case.fines.endless
     yield row("fines", scales.supplied_count, most=most)
     yield row("slab", scales.slab_length, most=most)
     yield row("feeding", scales.slab_length / scales.upstream_velocity)
     yield row("plug_time", scales.plug_time)
     yield row("cap_time", scales.cap_time)
-    yield row("time_step", scales.time_step)
 
 
 def _contact_rows(case: Case, scales: Scales) -> Iterator[Quantity]:
@@ -159,15 +145,8 @@ def _contact_rows(case: Case, scales: Scales) -> Iterator[Quantity]:
     yield row(f"{model}_factor", scales.stiffness_factor)
     for contact in scales.contacts.values():
         yield from _rows_of_pair(model, contact, least_restitution(case))
-    if not isinstance(case, InvasionCase):
-        return
-    if case.contact.cohesion_J_m3:
+    if isinstance(case, InvasionCase) and case.contact.cohesion_J_m3:
         yield row("pull_off", pull_off_of(case, scales.contacts["grain-fine"]).force)
-    if model == "hertz":
-        material = material_of(case, "fine", scales.stiffness_factor)
-        density = min(one.density for one in case.fines.components)
-        radius = case.fines.radius_range_m[0]
-        yield row("rayleigh", rayleigh_time(radius, density, *material))
 
 
 def _rows_of_pair(model: str, contact: Contact, least: float) -> Iterator[Quantity]:

@@ -214,7 +214,6 @@ def test_bad_keys_are_named():
     for keys, said in (
         (("clean_up.drawdown_MPa=-1",), "clean_up.drawdown_MPa: -1"),
         (("fluid.velocity_m_s=0.1",), "nothing says on which way the drawdown is lost"),
-        (("clean_up.duration_ms=1", "clean_up.cap_ms=2"), "clean_up.cap_ms: 2 together with"),
         (("clean_up.drawdowns_MPa=1",), "did you mean clean_up.drawdown_MPa"),
         (("clean_up.lift_cake=false",), "the cake is always lifted, remove the key"),
     ):

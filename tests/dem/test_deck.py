@@ -68,12 +68,8 @@ def test_gravity_is_left_out_when_negligible_and_reported():
     assert "# left out: buoyancy (switched off)" in heavy
 
 
-def test_the_neighbour_search_is_the_cases_or_the_measured_best():
+def test_the_neighbour_search_is_the_measured_best():
     assert has(invade_text(), r"^neighbor 5e-05 bin$")
-    assert not has(invade_text(), "binsize")
-    own = invade_text("run.skin_mm=0.02", "run.neighbour_bin_mm=0.2")
-    assert has(own, r"^neighbor 2e-05 bin$")
-    assert has(own, r"^neigh_modify binsize 0.0002$")
 
 
 def test_lost_atoms_are_errors_and_the_end_is_marked():

@@ -123,16 +123,6 @@ def test_a_trickle_may_count_as_plugged(go, tmp_path):
     )
 
 
-def test_the_neighbour_search_changes_time_not_motion(go, tmp_path):
-    """It changes the order of sums: before chaos grows, positions agree to 1e-6 of a fine."""
-    plain = go(tiny("run.duration_ms=0.04"), tmp_path / "plain")
-    assert plain.overlap.fraction > 0.01
-    for key in ("skin_mm=0.01", "skin_mm=0.25", "neighbour_bin_mm=0.05", "neighbour_bin_mm=1.6"):
-        own = go(tiny("run.duration_ms=0.04", f"run.{key}"), tmp_path / key)
-        near = np.allclose(own.state.position, plain.state.position, rtol=0, atol=1e-10)
-        assert near, key
-
-
 def test_fixed_grains_do_not_move_and_mobile_ones_do(go, grains_of, tmp_path):
     for motion in ("fixed", "mobile"):
         case = tiny(f"grains.motion={motion}", "run.duration_ms=0.2")

@@ -13,7 +13,6 @@ from fdnet.scales.drag import (
     MOST_CROWD_REYNOLDS,
     MOST_REYNOLDS,
     SOLVED,
-    Crowd,
     balanced_slip,
     bed_factor,
     crowd_drag_factor,
@@ -107,7 +106,7 @@ def test_the_forces_on_a_bed_are_its_pressure_drop():
     for porosity, most in ((0.35, 0.022), (0.40, 0.01), (0.45, 0.022)):
         solid = 1 - porosity
         number = solid / (math.pi / 6 * diameter**3)
-        total = number * stokes * float(crowd_drag_factor(Crowd(porosity=porosity)))
+        total = number * stokes * float(crowd_drag_factor(porosity))
         kozeny = 180 * viscosity * solid**2 * porosity * slip / (porosity**3 * diameter**2)
         extra = porosity**4 * (1 + 1.5 * math.sqrt(solid)) / (10 * solid)
         assert total == pytest.approx(kozeny * (1 + extra), rel=1e-12), porosity

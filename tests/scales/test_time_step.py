@@ -93,7 +93,7 @@ def test_a_given_refresh_warns_above_a_tenth_of_tau_and_is_refused_above_tau():
     for count in (101, 999, 1000):
         assert "drag is held for" in warnings_of(refreshed(count, step))
         assert scales_of(refreshed(count, step)).hold_steps == count
-    with pytest.raises(CaseError, match="at most 1000 steps are stable"):
+    with pytest.raises(CaseError, match="expected at most 1000"):
         scales_of(refreshed(1001, step))
 
 
