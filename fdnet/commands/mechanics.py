@@ -34,12 +34,7 @@ def add_mechanics(commands: Any) -> None:
 
 def _mechanics(options: argparse.Namespace) -> int:
     from fdnet.mechanics.triaxial import LoadStep, Triaxial
-    from fdnet.run.mechanics import (
-        measure_elastic,
-        measure_triaxial,
-        packed_case,
-        write_mechanics,
-    )
+    from fdnet.run.mechanics import measure_elastic, measure_triaxial, packed_case, write_mechanics
     from fdnet.run.records import RunOptions
 
     given, pressure = options.confining_MPa, None

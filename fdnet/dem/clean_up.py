@@ -8,13 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fdnet.dem.checkpoint import (
-    HISTORY,
-    Checkpoints,
-    Cleaned,
-    read_history,
-    state_at,
-)
+from fdnet.dem.checkpoint import HISTORY, Checkpoints, Cleaned, read_history, state_at
 from fdnet.dem.deck import (
     BELOW_ZERO,
     Deck,

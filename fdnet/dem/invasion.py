@@ -229,12 +229,7 @@ class ChunkedStage(ABC):
             last = read_history(self.folder, self.points.kind)[-1]
 
     def _update(
-        self,
-        feed: Feed,
-        updates: Updates,
-        last: Any | None,
-        pace: InvasionScales,
-        left: int,
+        self, feed: Feed, updates: Updates, last: Any | None, pace: InvasionScales, left: int
     ) -> int:
         """Compute the fluid's forces in the chunk after `last`, of which `left` steps remain.
 

@@ -126,12 +126,7 @@ def elastic_moduli(grains: Snapshot, case: Case, *, pressure_Pa: float | None = 
 
 
 def triaxial_test(
-    grains: Snapshot,
-    case: Case,
-    *,
-    confining_Pa: float,
-    strain: float = 0.01,
-    steps: int = 20,
+    grains: Snapshot, case: Case, *, confining_Pa: float, strain: float = 0.01, steps: int = 20
 ) -> Sheared:
     """Confine a pack and compress it along x, quasi-statically; all in SI units.
 

@@ -160,10 +160,7 @@ def kinematics(joints: Joints, count: int, *, length: float) -> Kinematics:
     kept, place = ~joints.at_wall, np.arange(6)
     grain = np.concatenate([joints.first, joints.second[kept]])
     block = np.concatenate(
-        [
-            -_block(frame, joints.arm_first, length),
-            _block(frame, joints.arm_second, length)[kept],
-        ]
+        [-_block(frame, joints.arm_first, length), _block(frame, joints.arm_second, length)[kept]]
     )
     row = 6 * np.arange(len(joints))[:, None, None] + place[None, :, None]
     row = np.broadcast_to(np.concatenate([row, row[kept]]), block.shape)

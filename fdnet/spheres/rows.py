@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.spheres.snapshot import (
-    KIND_NAMES,
-    UNITS,
-    Array,
-    Kind,
-    frozen,
-    metres_per,
-    one_line,
-)
+from fdnet.spheres.snapshot import KIND_NAMES, UNITS, Array, Kind, frozen, metres_per, one_line
 
 PLACES = tuple(tuple(f"{axis}{end}" for axis in "xyz") for end in ("", "u", "s", "su"))
 PLACES += (("points:0", "points:1", "points:2"),)
