@@ -2,10 +2,9 @@
 
 import shlex
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case, recorded_case, set_keys
@@ -15,12 +14,11 @@ from fdnet.files import write_text
 from fdnet.mechanics.of_case import (
     elastic_moduli,
     elastic_numbers,
-    pack_material,
     triaxial_numbers,
+    triaxial_test,
     triaxial_warnings,
     warnings_of,
 )
-from fdnet.mechanics.triaxial import LoadStep, Triaxial, triaxial
 from fdnet.report.html import put_mechanics
 from fdnet.report.tables import plain_json, write_rows
 from fdnet.run.folder import CASE, START_OVER, check_files, is_run_folder, read_record
@@ -32,15 +30,8 @@ FOLDER, NUMBERS, CURVE = "mechanics", "mechanics.json", "stress_strain.csv"
 """Folder of the mechanics in a run folder, the file with its numbers, the curve of a test."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Packed:
-    """A case and its grains at rest.
-
-    Attributes:
-        case: what was packed.
-        grains: as packed.
-        folder: the run folder.
-    """
+class Packed(NamedTuple):
+    """A case, its grains at rest, and the run folder."""
 
     case: Case
     grains: Snapshot
@@ -64,10 +55,10 @@ def packed_case(source: Path, options: RunOptions, assignments: list[str]) -> Pa
             raise CaseError(f"{folder}: holds no fdnet run; give a case file or a run folder")
         case = case_from(set_keys(recorded_case(file).data(), assignments), source=str(file))
         if read_record(folder, "pack") is None:
+            words = f"{shlex.quote(str(file))} --out {shlex.quote(str(folder))}"
             raise CaseError(
-                f"{folder}: holds no finished pack; run the stage pack first (fdnet run "
-                f"{shlex.quote(str(file))} --out {shlex.quote(str(folder))} --stages pack "
-                "--resume)"
+                f"{folder}: holds no finished pack; run the stage pack first (fdnet run {words} "
+                "--stages pack --resume)"
             )
     else:
         case = read_case(source, assignments=assignments)
@@ -86,7 +77,7 @@ def packed_case(source: Path, options: RunOptions, assignments: list[str]) -> Pa
             f"{folder}: its pack belongs to another case; give another --out, or leave out --set "
             "of keys that change the pack"
         )
-    return Packed(case=case, grains=snapshot_of(frame, case, time_s=0.0), folder=folder)
+    return Packed(case, snapshot_of(frame, case, time_s=0.0), folder)
 
 
 def measure_elastic(packed: Packed, pressure_Pa: float | None) -> dict[str, Any]:
@@ -105,32 +96,26 @@ def measure_elastic(packed: Packed, pressure_Pa: float | None) -> dict[str, Any]
     }
 
 
-def measure_triaxial(
-    packed: Packed, test: Triaxial, follow: Callable[[LoadStep], None]
-) -> dict[str, Any]:
-    """A triaxial test of the pack, as its numbers with warnings and seconds.
+def measure_triaxial(packed: Packed, **test: Any) -> dict[str, Any]:
+    """A `triaxial_test` of the pack, as its numbers with warnings and seconds.
 
     Writes stress_strain.csv and its figure to the folder of the mechanics.
     """
     from fdnet.report.figures import draw_stress_strain
 
-    start, case = time.monotonic(), packed.case
-    material = pack_material(case, packed.grains, test.confining)
-    result = triaxial(packed.grains, material, test, periodic=case.periodic, follow=follow)
+    start = time.monotonic()
+    result = triaxial_test(packed.grains, packed.case, **test)
     numbers = triaxial_numbers(result)
     numbers["warnings"] = [explained(one) for one in triaxial_warnings(result)]
     numbers["seconds"] = time.monotonic() - start
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     rows = [asdict(row) for row in result.rows]
-    write_rows(folder / CURVE, {_COLUMNS.get(k, k): [row[k] for row in rows] for k in rows[0]})
+    own = {"axial": "axial_Pa", "side": "side_Pa"}
+    own |= {"tension": "broken_in_tension", "shear": "broken_in_shear"}
+    write_rows(folder / CURVE, {own.get(k, k): [row[k] for row in rows] for k in rows[0]})
     draw_stress_strain(result.rows, folder / "stress_strain.png", bonds=result.bonds)
     return numbers
-
-
-_COLUMNS = {"axial": "axial_Pa", "side": "side_Pa", "tension": "broken_in_tension"} | {
-    "shear": "broken_in_shear"
-}
 
 
 def write_mechanics(packed: Packed, numbers: dict[str, Any]) -> Path:
