@@ -80,12 +80,7 @@ def render_clean_up(
             "resume": False,
             "regions": specimen_regions(case)
             | {"out": f"INF {number(BELOW_ZERO)} INF INF INF INF"},
-            "start": {
-                "chunk": last.chunk + 1 if last else 1,
-                "out": last.out if last else 0,
-                "passed": last.passed if last else 0,
-                "quiet": last.quiet if last else 0,
-            },
+            "start": last._replace(chunk=last.chunk + 1) if last else Cleaned(1, *[0] * 5),
             "chunks": flow.chunks,
             "quiet_chunks": flow.quiet_chunks,
         },
@@ -111,12 +106,7 @@ def turned_drag(flow: BackFlow) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CleanUpStage(ChunkedStage):
-    """A clean-up as it is run.
-
-    Attributes:
-        flow: that is turned back.
-        start: what it begins with.
-    """
+    """A clean-up as it is run: the flow that is turned back, and what it begins with."""
 
     flow: BackFlow
     start: Start
@@ -164,13 +154,8 @@ class CleanUpStage(ChunkedStage):
             return "duration", []
         if last.quiet >= self.flow.quiet_chunks:
             return "quiet", []
-        return "cap", [
-            Doubt(
-                "clean-up-at-its-cap",
-                "the clean-up stopped at its cap while fines still came out: raise "
-                "clean_up.cap_ms",
-            )
-        ]
+        text = "the clean-up stopped at its cap while fines still came out: raise clean_up.cap_ms"
+        return "cap", [Doubt("clean-up-at-its-cap", text)]
 
 
 def fines_inside(spheres: Snapshot) -> Array:

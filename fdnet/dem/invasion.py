@@ -11,9 +11,9 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -50,18 +50,16 @@ from fdnet.dem.invade_deck import (
     SCRATCH,
     SUPPLY,
     DrivingFluid,
+    InvadeInputs,
     Moment,
     fine_density,
     read_state,
     render_invade,
-    write_batch,
-    write_batches,
     write_forces,
-    write_invade_inputs,
     write_parts,
 )
 from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
-from fdnet.dem.supply import batches_of, densities, later_batch
+from fdnet.dem.supply import batches_of, later_batch
 from fdnet.errors import CaseError, Doubt, LiggghtsError
 from fdnet.files import disk_is_full, write_text
 from fdnet.scales.clock import ARRIVALS, rises
@@ -77,8 +75,6 @@ class ChunkedStage(ABC):
     """A stage that is run in chunks of steps.
 
     Attributes:
-        case: what is run.
-        scales: of the case.
         grains: of the pack.
         points: its checkpoints, in its folder.
         launch: how LIGGGHTS is started.
@@ -187,10 +183,8 @@ class ChunkedStage(ABC):
 
     def _keep(self, step: int) -> None:
         if disk_is_full(self.folder):
-            raise LiggghtsError(
-                f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
-                "continue with --resume"
-            )
+            advice = "make room and continue with --resume"
+            raise LiggghtsError(f"{self.folder}: the disk is full, LIGGGHTS was stopped; {advice}")
         past = [row for row in read_rows(self.folder, self.points.kind) if row.step <= step]
         rows = [row for row in past if row.step == step][-1:]
         since = max((row.step for row in past if row.step < step), default=-1)
@@ -238,16 +232,16 @@ class ChunkedStage(ABC):
         done = pace.checkpoint_steps - left
         step = (last.step if last else self.first_step) + done
         time = self.time_at(last, done * self.scales.checkpoint_steps / pace.checkpoint_steps)
-        frame, dt = self.shown(feed), pace.time_step
-        spheres, density = self.spheres(frame, time), fine_density(frame)
+        frame = self.shown(feed)
+        spheres = self.spheres(frame, time)
         moment = Moment(
             step=step,
             time=time,
             before=updates.last,
             fresh=done == 0,
-            left=left * dt,
+            left=left * pace.time_step,
             given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0),
-            density=density,
+            density=fine_density(frame),
         )
         assert self.fluid is not None
         forces = self.fluid.forces(spheres, moment)
@@ -327,18 +321,22 @@ class Invasion(EndedStage):
 class InvadeStage(ChunkedStage):
     """An invasion as it is run."""
 
+    @cached_property
+    def inputs(self) -> InvadeInputs:
+        """The files that its deck reads."""
+        return InvadeInputs(self.case, self.scales, self.grains, self.folder)
+
     def write(self, last: Checkpoint | None) -> Deck:
         """Write the inputs of a start, or of a restart from `last`."""
-        case, scales, grains, folder = self.case, self.scales, self.grains, self.folder
         ranks = self.launch.ranks
         if last is None:
-            return write_invade_inputs(case, scales, grains, folder, ranks=ranks)
-        if case.fines.supply == "batches":
-            write_batches(case, scales, grains, folder)
+            return self.inputs.write(ranks=ranks)
+        if self.case.fines.supply == "batches":
+            self.inputs.write_batches()
         pace = self.pace(last)
-        write_parts(case, pace, grains, folder)
-        deck = render_invade(case, pace, grains, ranks=ranks, resume=last)
-        write_text(folder / f"{self.deck}.resume", deck.text)
+        write_parts(self.case, pace, self.grains, self.folder)
+        deck = render_invade(self.case, pace, self.grains, ranks=ranks, resume=last)
+        write_text(self.folder / f"{self.deck}.resume", deck.text)
         return deck
 
     def over(self, last: Checkpoint) -> bool:
@@ -414,12 +412,10 @@ class InvadeStage(ChunkedStage):
                 velocity = float(updates.last["velocity_m_s"])
                 moved = float(updates.last["filtrate_m3"]) / area + velocity * since
             ahead = velocity * scales.checkpoint_steps * scales.time_step
-            density = densities(case, batches.counts)
             for which in range(entered, batches.entered_after(moved + ahead)):
                 spheres = self.spheres(self.shown(feed), time)
                 fines = later_batch(case, scales, spheres, which, moved)
-                inputs = case, scales, self.grains, self.folder
-                feed(f"include {write_batch(*inputs, which, fines, velocity, density)}")
+                feed(f"include {self.inputs.write_batch(which, fines, velocity)}")
         if is_watched(case):
             feed(f"include {WATCHED}")
 
@@ -430,8 +426,7 @@ class InvadeStage(ChunkedStage):
         `ARRIVALS` fines wait upstream. Mud without an end was cut off then.
         """
         case, scales, last = self.case, self.scales, history[-1]
-        waiting = last.upstream - last.removed_upstream
-        warnings: list[str] = []
+        waiting, warnings = last.waiting, list[str]()
         reason = flow_says(self.folder, case, scales, last.step)
         if reason is None and case.run.duration_s is not None:
             reason = "duration"
@@ -439,43 +434,31 @@ class InvadeStage(ChunkedStage):
             reason = "mud_cut_off" if case.fines.endless else "supply_exhausted"
             reason = "plugged" if waiting >= ARRIVALS else reason
         elif reason is None:
-            reason, cap = "cap", scales.cap_time * scales.force_factor
-            warnings.append(
-                Doubt(
-                    "stopped-at-the-cap",
-                    f"invasion stopped at its cap of {1e3 * cap:.3g} ms before the stop rule "
-                    "held: raise run.cap_ms",
-                )
-            )
+            reason, cap = "cap", f"{1e3 * scales.cap_time * scales.force_factor:.3g} ms"
+            rule = "before the stop rule held: raise run.cap_ms"
+            text = f"invasion stopped at its cap of {cap} {rule}"
+            warnings.append(Doubt("stopped-at-the-cap", text))
         if case.fines.endless and (waiting == 0 or reason == "mud_cut_off"):
-            warnings.append(
-                Doubt(
-                    "mud-cut-off",
-                    f"the mud was cut off after {scales.supplied_count} fines "
-                    f"({1e3 * scales.slab_length:.3g} mm of mud): give fines.slab_mm for more",
-                )
+            text = (
+                f"the mud was cut off after {scales.supplied_count} fines "
+                f"({1e3 * scales.slab_length:.3g} mm of mud): give fines.slab_mm for more"
             )
+            warnings.append(Doubt("mud-cut-off", text))
         elif waiting == 0 or reason == "supply_exhausted":
             left = "no fine is left upstream: the end was decided by an empty slab"
             if waiting:
                 left = f"only {waiting} fines are left upstream, too few to call the face plugged"
             warnings.append(Doubt("empty-slab", f"{left}: raise fines.count or fines.slab_mm"))
-        before = history[-min(len(history), quiet_chunks(scales) + 1)]
-        if reason == "plugged" and last.passed - before.passed > plug_allowance(case, scales):
-            warnings.append(
-                Doubt(
-                    "still-leaving",
-                    f"the face was plugged, but {last.passed - before.passed} fines still left "
-                    "through the outlet meanwhile: raise run.plug_time_ms to follow them",
-                )
+        fled = last.passed - history[-min(len(history), quiet_chunks(scales) + 1)].passed
+        if reason == "plugged" and fled > plug_allowance(case, scales):
+            text = (
+                f"the face was plugged, but {fled} fines still left through the outlet meanwhile: "
+                "raise run.plug_time_ms to follow them"
             )
+            warnings.append(Doubt("still-leaving", text))
         if last.removed_upstream:
-            warnings.append(
-                Doubt(
-                    "bounced-out",
-                    f"{last.removed_upstream} fines bounced out upstream and were removed",
-                )
-            )
+            text = f"{last.removed_upstream} fines bounced out upstream and were removed"
+            warnings.append(Doubt("bounced-out", text))
         return reason, warnings
 
 
@@ -502,8 +485,8 @@ def invade(
     deck, runs = stage.drive()
     history = read_history(folder)
     reason, warnings = stage.ending(history)
-    ended = _Ended(reason, warnings + points.doubts(), launch.ranks, deck.left_out, runs)
-    return _read(case, scales, grains, folder, history, ended)
+    ended = {"stop_reason": reason, "left_out": deck.left_out, "runs": runs}
+    return _read(case, scales, grains, points, history, warnings, **ended, ranks=launch.ranks)
 
 
 def invasion_so_far(
@@ -519,48 +502,42 @@ def invasion_so_far(
     if last is None or record is None:
         return None
     history = tuple(row for row in read_history(folder) if row.step <= last.step)
-    ended = _Ended("unfinished", points.doubts(), record.ranks)
-    return _read(case, scales, grains, folder, history, ended)
-
-
-class _Ended(NamedTuple):
-    """How an invasion ended; the fields are those of `EndedStage`."""
-
-    stop_reason: str
-    warnings: list[str]
-    ranks: int
-    left_out: tuple[LeftOut, ...] = ()
-    runs: tuple[Execution, ...] = ()
+    ended = {"stop_reason": "unfinished", "left_out": (), "runs": ()}
+    return _read(case, scales, grains, points, history, [], **ended, ranks=record.ranks)
 
 
 def _read(
     case: InvasionCase,
     scales: InvasionScales,
     grains: Snapshot,
-    folder: Path,
+    points: Checkpoints,
     history: tuple[Checkpoint, ...],
-    ended: _Ended,
+    warnings: Sequence[str],
+    **ended: Any,
 ) -> Invasion:
-    """The invasion whose files are in `folder`, up to the last checkpoint of the `history`."""
-    batches, step = batches_of(case, scales), history[-1].step
-    overlaps, damaged = [], grains
+    """The invasion in the folder of its `points`, up to the last checkpoint of the `history`.
+
+    `ended` are the fields of `EndedStage` that no file tells.
+    """
+    folder, step, overlaps, damaged = points.folder, history[-1].step, [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
+    warnings = [*warnings, *points.doubts()]
     if len(overlaps) < len(history):
-        ended.warnings.append(
-            Doubt(
-                "dumps-cannot-be-read",
-                f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be "
-                "read: they are missing from the largest overlap and from invasion.pvd",
-            )
+        text = (
+            f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be read: "
+            "they are missing from the largest overlap and from invasion.pvd"
         )
+        warnings.append(Doubt("dumps-cannot-be-read", text))
     begun = history[-2].step if len(history) > 1 else 0
+    entered = entered_by(case, batches_of(case, scales), history[-1])
     return Invasion(
-        **ended._asdict() | {"warnings": tuple(ended.warnings)},
+        **ended,
         state=damaged,
         history=history,
+        warnings=tuple(warnings),
         last=stiffened(case, scales, step - begun),
-        supplied=batches.supplied(entered_by(case, batches, history[-1])),
+        supplied=batches_of(case, scales).supplied(entered),
         overlap=deepest_of([*overlaps, *(one for one in read_watch(folder) if one.step <= step)]),
         step_s=scales.time_step,
         updates=tuple(row for row in read_updates(folder) if row["step"] < step),
