@@ -22,7 +22,7 @@ import numpy as np
 from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.deck import number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
-from fdnet.errors import CaseError, Doubt, DumpError, LiggghtsError, explained
+from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.files import write_text
 from fdnet.scales.clock import ARRIVALS, PRESSED, arrival_time, rises
 from fdnet.scales.contacts import two_digits_up
@@ -32,8 +32,6 @@ from fdnet.spheres.geometry import groups_apart, max_overlap
 from fdnet.spheres.snapshot import Snapshot
 
 HISTORY, UPDATES, WATCH = "history.csv", "updates.csv", "overlap.csv"
-DOUBTS = "doubts.txt"
-"""Warnings of the sessions that went on from an earlier checkpoint than they could."""
 _SUFFIXES = "dump|restart|npz|unreadable|record"
 
 
@@ -250,31 +248,6 @@ class Checkpoints:
                     f"{version('fdnet')} may make other forces; run it anew with --force, or "
                     "continue with the fdnet that began it"
                 )
-
-    def doubt(self, last: Any | None) -> None:
-        """Keep a warning where the stage goes on from an earlier checkpoint than it could.
-
-        It is kept until the stage is finished, in whichever session. A checkpoint that has no
-        record was cut itself, which needs no warning.
-        """
-        newest = max((step for step, _ in self.files("record")), default=0)
-        warnings = self.doubts()
-        if last is None and (newest or len(read_rows(self.folder, self.kind)) > 1):
-            text = "no checkpoint of the cut run could be used, it was started over"
-            warnings.append(Doubt("started-over", text))
-        elif last is not None and newest > last.step:
-            text = (
-                f"files of the cut run were not those that were recorded (checkpoint at step "
-                f"{newest}): it went on from the checkpoint at step {last.step}"
-            )
-            warnings.append(Doubt("earlier-checkpoint", text))
-        if warnings:
-            text = "".join(f"{line}\n" for line in dict.fromkeys(map(explained, warnings)))
-            write_text(self.folder / DOUBTS, text)
-
-    def doubts(self) -> list[str]:
-        """The warnings that this and earlier sessions kept."""
-        return _whole_lines(self.folder / DOUBTS)
 
 
 def file_digest(path: Path) -> str:

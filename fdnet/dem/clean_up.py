@@ -85,7 +85,7 @@ def render_clean_up(
             "quiet_chunks": flow.quiet_chunks,
         },
     )
-    return Deck(text=text, stage="clean_up", digest=digest, left_out=tuple(left_out))
+    return Deck(text, tuple(left_out))
 
 
 def turned_drag(flow: BackFlow) -> dict[str, Any]:
@@ -210,7 +210,7 @@ def clean_up(
         state=state,
         history=history,
         stop_reason=reason,
-        warnings=(*warnings, *stage.points.doubts()),
+        warnings=tuple(warnings),
         left_out=deck.left_out,
         runs=runs,
         ranks=launch.ranks,

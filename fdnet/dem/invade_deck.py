@@ -338,7 +338,7 @@ def render_invade(
             "stop_when_plugged": case.run.duration_s is None,
         },
     )
-    return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
+    return Deck(text, tuple(left_out))
 
 
 def moving_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:

@@ -141,7 +141,6 @@ class ChunkedStage(ABC):
         runs: tuple[Execution, ...] = ()
         while True:
             last = self.points.last()
-            self.points.doubt(last)
             self.points.cut(last)
             deck, name = self.write(last), self.deck if last is None else f"{self.deck}.resume"
             if last is not None:
@@ -192,10 +191,8 @@ class ChunkedStage(ABC):
         for row in rows:
             self.points.keep(row, ranks=self.launch.ranks, overlaps=overlaps)
         if not rows and self.points.stage == "invade" and self.case.run.on_overlap == "stop":
-            raise LiggghtsError(
-                f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
-                "with --resume"
-            )
+            missing = f"no row for the checkpoint at step {step}; continue with --resume"
+            raise LiggghtsError(f"{self.folder / HISTORY}: {missing}")
         self.points.remove_restarts(step)
         self.look_at(rows, overlaps)
 
@@ -522,13 +519,12 @@ def _read(
     folder, step, overlaps, damaged = points.folder, history[-1].step, [], grains
     for _, damaged in readable_states(folder, history, case, scales, grains):
         overlaps.append(overlap_in(case, damaged))
-    warnings = [*warnings, *points.doubts()]
     if len(overlaps) < len(history):
         text = (
             f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be read: "
             "they are missing from the largest overlap and from invasion.pvd"
         )
-        warnings.append(Doubt("dumps-cannot-be-read", text))
+        warnings = [*warnings, Doubt("dumps-cannot-be-read", text)]
     begun = history[-2].step if len(history) > 1 else 0
     entered = entered_by(case, batches_of(case, scales), history[-1])
     return Invasion(
