@@ -8,17 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from fdnet.dem import deck
 from fdnet.dem.checkpoint import HISTORY, Checkpoints, Cleaned, read_history, state_at
-from fdnet.dem.deck import (
-    BELOW_ZERO,
-    Deck,
-    drag_variables,
-    forces_left_out,
-    gravity_variables,
-    header_variables,
-    number,
-    render_text,
-)
+from fdnet.dem.deck import BELOW_ZERO, Deck, number
 from fdnet.dem.invade_deck import (
     DrivingFluid,
     coupled_parts,
@@ -64,11 +56,11 @@ def render_clean_up(
     `restart` is the path of the restart file that it begins with, from the folder of the deck.
     """
     case, scales = flow.case, flow.scales
-    gravity, left_out = gravity_variables(case, scales)
-    left_out += forces_left_out(case)
-    text = render_text(
+    gravity, left_out = deck.gravity_variables(case, scales)
+    left_out += deck.forces_left_out(case)
+    text = deck.render_text(
         "clean_up.in.j2",
-        header_variables(case, "invade", left_out, ranks)
+        deck.header_variables(case, "invade", left_out, ranks)
         | moving_variables(case, scales)
         | {
             "stage": "clean_up",
@@ -100,7 +92,7 @@ def turned_drag(flow: BackFlow) -> dict[str, Any]:
         upstream_velocity=-scales.upstream_velocity,
         push=replace(push, velocity=-push.velocity, gradient=-push.gradient, reynolds_slope=0.0),
     )
-    ahead, back = drag_variables(flow.case, scales), drag_variables(flow.case, turned)
+    ahead, back = deck.drag_variables(flow.case, scales), deck.drag_variables(flow.case, turned)
     return back | {"inertia": ahead["inertia"]} if "inertia" in ahead else back
 
 
@@ -132,14 +124,14 @@ class CleanUpStage(ChunkedStage):
             restart = f"../{start.invasion.name}/post/{path.name}"
         else:
             restart, name = f"post/clean_{last.step}.restart", f"{name}.resume"
-        deck = render_clean_up(self.flow, start.digest, restart, last, ranks=self.launch.ranks)
-        write_text(self.folder / name, deck.text)
+        made = render_clean_up(self.flow, start.digest, restart, last, ranks=self.launch.ranks)
+        write_text(self.folder / name, made.text)
         parts = coupled_parts(case, self.flow.scales)
         if parts:
-            parts["checkpoint.in"] = render_text("cleaned.in.j2", dump_variables(case))
+            parts["checkpoint.in"] = deck.render_text("cleaned.in.j2", dump_variables(case))
         for part, text in parts.items():
             write_text(self.folder / part, text)
-        return deck
+        return made
 
     def over(self, last: Cleaned) -> bool:
         """Whether the checkpoint `last` is the end."""
@@ -189,7 +181,7 @@ def clean_up(
         flow=flow,
         start=start,
     )
-    deck, runs = stage.drive()
+    made, runs = stage.drive()
     history = read_history(folder, Cleaned)
     last = history[-1]
     state = state_at(folder, last, flow.case, flow.scales, start.grains)
@@ -211,7 +203,7 @@ def clean_up(
         history=history,
         stop_reason=reason,
         warnings=tuple(warnings),
-        left_out=deck.left_out,
+        left_out=made.left_out,
         runs=runs,
         ranks=launch.ranks,
         step_s=flow.step,

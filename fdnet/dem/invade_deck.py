@@ -18,30 +18,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.dem.checkpoint import (
-    Checkpoint,
-    chunks_of,
-    empty_chunks,
-    plug_allowance,
-    quiet_chunks,
-    watch_variables,
-    write_watch_parts,
-)
-from fdnet.dem.deck import (
-    BELOW_ZERO,
-    Deck,
-    LeftOut,
-    contact_variables,
-    drag_variables,
-    forces_left_out,
-    gravity_variables,
-    header_variables,
-    number,
-    render_text,
-    specimen_box,
-    wall_variables,
-    write_data,
-)
+from fdnet.dem import checkpoint, deck
+from fdnet.dem.checkpoint import Checkpoint
+from fdnet.dem.deck import BELOW_ZERO, Deck, LeftOut, number
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.supply import AT_ONCE, batches_of, densities, place_batches, slab_end
 from fdnet.errors import CaseError
@@ -166,11 +145,11 @@ def coupled_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
         return {}
     shown = dump_variables(case)
     asked = {"dump_columns": SHOWN_COLUMNS, "dump_group": shown["dump_group"], "state": STATE}
-    counted = shown | {"allowance": plug_allowance(case, scales), "follows": True}
+    counted = shown | {"allowance": checkpoint.plug_allowance(case, scales), "follows": True}
     return {
-        "ask.in": render_text("ask.in.j2", asked),
-        "fluid.in": render_text("fluid.in.j2", {}),
-        "checkpoint.in": render_text("checkpoint.in.j2", counted),
+        "ask.in": deck.render_text("ask.in.j2", asked),
+        "fluid.in": deck.render_text("fluid.in.j2", {}),
+        "checkpoint.in": deck.render_text("checkpoint.in.j2", counted),
     }
 
 
@@ -206,11 +185,11 @@ class InvadeInputs:
                 "fines: a fine would start in contact; this is an fdnet fault, please report the "
                 "case and seed"
             )
-        deck = render_invade(case, scales, grains, ranks=ranks)
-        write_text(folder / "in.invade", deck.text)
+        made = render_invade(case, scales, grains, ranks=ranks)
+        write_text(folder / "in.invade", made.text)
         write_parts(case, scales, grains, folder)
         self._write_data("invade", spheres)
-        return deck
+        return made
 
     def write_batches(self) -> Snapshot:
         """Write the batches that are read before later chunks; the fines that are there at first.
@@ -237,9 +216,9 @@ class InvadeInputs:
             "first": int(fines.id[0]),
             "last": int(fines.id[-1]),
             "start_velocity": number(velocity),
-            "drag": drag_variables(self.case, self.scales),
+            "drag": deck.drag_variables(self.case, self.scales),
         }
-        write_text(self.folder / f"{name}.in", render_text("batch.in.j2", values))
+        write_text(self.folder / f"{name}.in", deck.render_text("batch.in.j2", values))
         return f"{name}.in"
 
     def _write_data(self, name: str, spheres: Snapshot) -> None:
@@ -247,7 +226,7 @@ class InvadeInputs:
         density = np.full(len(spheres), self.case.grains.density_kg_m3)
         density[fine] = self._fine_density[spheres.id[fine] - (int(grains.id.max()) + 1)]
         bounds, path = _bounds(self.case, self.scales, grains), self.folder / f"{name}.data"
-        write_data(path, spheres, bounds=bounds, density=density, types=3)
+        deck.write_data(path, spheres, bounds=bounds, density=density, types=3)
 
     @cached_property
     def _fine_density(self) -> Array:
@@ -260,7 +239,7 @@ def write_parts(
     """Write the files that a deck of the invasion includes, apart from the batches."""
     for name, text in coupled_parts(case, scales).items():
         write_text(folder / name, text)
-    write_watch_parts(case, grains, folder)
+    checkpoint.write_watch_parts(case, grains, folder)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -301,30 +280,30 @@ def render_invade(
 
     Grains that are not `packed` stand for those of a pack that is not made yet.
     """
-    gravity, left_out = gravity_variables(case, scales)
-    left_out += [*forces_left_out(case), *_left_out(case, scales, ranks, packed)]
+    gravity, left_out = deck.gravity_variables(case, scales)
+    left_out += [*deck.forces_left_out(case), *_left_out(case, scales, ranks, packed)]
     batches = len(batches_of(case, scales).counts)
     behind = _bounds(case, scales, grains)[0, 0] + _margin(case, scales)
     sides = "INF INF INF INF"
-    text = render_text(
+    text = deck.render_text(
         "invade.in.j2",
-        header_variables(case, "invade", left_out, ranks)
+        deck.header_variables(case, "invade", left_out, ranks)
         | moving_variables(case, scales)
         | {
             "gravity": gravity,
             "resume": resume and {"restart": f"post/invade_{resume.step}.restart"},
             "scratch": SCRATCH,
             "start_velocity": number(scales.upstream_velocity),
-            "drag": drag_variables(case, scales),
-            "overlap": watch_variables(case, scales, grains) if packed else None,
+            "drag": deck.drag_variables(case, scales),
+            "overlap": checkpoint.watch_variables(case, scales, grains) if packed else None,
             "regions": specimen_regions(case)
             | {
                 "upstream": f"{number(np.nextafter(behind, 0))} {number(BELOW_ZERO)} {sides}",
                 "behind": f"INF {number(behind)} {sides}",
             },
-            "quiet_checkpoints": quiet_chunks(scales),
-            "empty_checkpoints": empty_chunks(case, scales),
-            "allowance": plug_allowance(case, scales),
+            "quiet_checkpoints": checkpoint.quiet_chunks(scales),
+            "empty_checkpoints": checkpoint.empty_chunks(case, scales),
+            "allowance": checkpoint.plug_allowance(case, scales),
             "start": resume._replace(chunk=resume.chunk + 1)
             if resume
             else Checkpoint(1, *[0] * 7),
@@ -334,7 +313,7 @@ def render_invade(
             "slowed": case.drag.slowed,
             "follows": case.drag.coupled,
             "supply": SUPPLY,
-            "chunks": chunks_of(case, scales),
+            "chunks": checkpoint.chunks_of(case, scales),
             "stop_when_plugged": case.run.duration_s is None,
         },
     )
@@ -352,9 +331,11 @@ def moving_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, An
     return dump_variables(case) | {
         "skin": number(skin),
         "neighbour_bin": number(case.run.neighbour_bin_m) if case.run.neighbour_bin_m else "",
-        "contacts": contact_variables(case, scales, "invade", friction=_friction(case, scales)),
+        "contacts": deck.contact_variables(
+            case, scales, "invade", friction=_friction(case, scales)
+        ),
         "time_step": number(scales.time_step),
-        "walls": wall_variables(case, "invade", friction=walls),
+        "walls": deck.wall_variables(case, "invade", friction=walls),
         "fixed_grains": not mobile,
         "moving": "all" if mobile else "fines",
         "thermo_steps": max(1, scales.checkpoint_steps // 4),
@@ -421,11 +402,11 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     }
     invasion = {}
     if isinstance(case, InvasionCase):
-        radius, box = case.grains.radius_range_m[1], specimen_box(case)
+        radius, box = case.grains.radius_range_m[1], deck.specimen_box(case)
         grain = resting(np.array([[0.7 * radius, *(box[1:, 1] / 2)]]), radius, box)
         flow = invasion_scales(case)
-        deck = render_invade(case, flow, grain, ranks=ranks, packed=False)
-        invasion = {"in.invade": deck.text, **coupled_parts(case, flow)}
+        made = render_invade(case, flow, grain, ranks=ranks, packed=False)
+        invasion = {"in.invade": made.text, **coupled_parts(case, flow)}
     texts = {out / "invade" / name: text for name, text in invasion.items()}
     files = (decks["pack"], out / "pack" / "pack.data", *texts)
     there = [path for path in files if os.path.lexists(path)]

@@ -13,18 +13,8 @@ from typing import Any
 import numpy as np
 
 from fdnet.case.case import Case
-from fdnet.dem.deck import (
-    Deck,
-    LeftOut,
-    contact_variables,
-    header_variables,
-    number,
-    render_text,
-    snapshot_of,
-    specimen_box,
-    wall_variables,
-    write_data,
-)
+from fdnet.dem import deck
+from fdnet.dem.deck import Deck, LeftOut, number
 from fdnet.dem.liggghts import SCREEN, Execution, Launch, run_deck
 from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.scales.contacts import restitution_of, sphere_mass
@@ -61,9 +51,9 @@ def write_pack_inputs(case: Case, folder: Path, *, count: int, places: int = 0) 
 
     `places` numbers the sets of random places that the same grains may start from.
     """
-    deck = render_pack(case, count=count)
-    (folder / "in.pack").write_text(deck.text)
-    radii, box = draw_radii(case, count), specimen_box(case)
+    made = render_pack(case, count=count)
+    (folder / "in.pack").write_text(made.text)
+    radii, box = draw_radii(case, count), deck.specimen_box(case)
     rng = np.random.default_rng([case.seed, count, *([places] if places else [])])
     small, size = PACK_START * radii, np.array(case.size_m)
     sides = 0.0 if case.box.sides == "periodic" else 1.0
@@ -71,8 +61,8 @@ def write_pack_inputs(case: Case, folder: Path, *, count: int, places: int = 0) 
     place = margin + rng.random((count, 3)) * (size - 2 * margin)
     density = np.full(count, case.grains.density_kg_m3)
     seeds = resting(place, small, box)
-    write_data(folder / "pack.data", seeds, bounds=box, density=density, types=2)
-    return deck
+    deck.write_data(folder / "pack.data", seeds, bounds=box, density=density, types=2)
+    return made
 
 
 def draw_radii(case: Case, count: int) -> Array:
@@ -119,18 +109,18 @@ def render_pack(case: Case, *, count: int) -> Deck:
         LeftOut("fines and fluid", "the pack is made before the invasion"),
         LeftOut("MPI processor grid", "one rank"),
     ]
-    contacts = contact_variables(case, scales, "pack", friction=False)
+    contacts = deck.contact_variables(case, scales, "pack", friction=False)
     damping = ("damping", 0.8 * math.sqrt(stiffness / mass))
     if case.contact.model == "hertz":
         damping = ("restitution", restitution_of(PACK_DAMPING))
     contacts[damping[0]] = " ".join([number(damping[1])] * contacts["size"] ** 2)
-    text = render_text(
+    text = deck.render_text(
         "pack.in.j2",
-        header_variables(case, "pack", left_out, 1)
+        deck.header_variables(case, "pack", left_out, 1)
         | {
             "skin": number(0.4 * low),
             "contacts": contacts,
-            "walls": wall_variables(case, "pack", friction=False),
+            "walls": deck.wall_variables(case, "pack", friction=False),
             "time_step": number(pack_step(case, contact)),
             "viscous": number(0.03 * math.sqrt(stiffness * mass)),
             "thermo_steps": RELAX_RUN_STEPS,
@@ -299,7 +289,7 @@ def _attempt(case: Case, folder: Path, launch: Launch, *, count: int, places: in
     if folder.exists():
         shutil.rmtree(folder)
     (folder / "post").mkdir(parents=True)
-    deck = write_pack_inputs(case, folder, count=count, places=places)
+    made = write_pack_inputs(case, folder, count=count, places=places)
     step = pack_step(case, packing_scales(case).contacts["grain-grain"])
     try:
         run = run_deck(folder, "in.pack", launch)
@@ -312,7 +302,7 @@ def _attempt(case: Case, folder: Path, launch: Launch, *, count: int, places: in
         ) from error
     dump = folder / "post" / "pack.dump"
     frame = read_frame(dump)
-    grains = snapshot_of(frame, case, time_s=0.0)
+    grains = deck.snapshot_of(frame, case, time_s=0.0)
     restless = "FDNET restless" in (folder / SCREEN).read_text("utf-8", errors="replace")
     creep = creep_of(case, step, folder, grains) if restless else 0.0
     if len(grains) != count:
@@ -328,7 +318,7 @@ def _attempt(case: Case, folder: Path, launch: Launch, *, count: int, places: in
         steps=frame.step,
         step_s=step,
         attempts=(),
-        left_out=deck.left_out,
+        left_out=made.left_out,
         run=run,
         creep=creep,
         restless=places,

@@ -12,17 +12,8 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from fdnet.errors import MechanicsError
-from fdnet.mechanics.springs import (
-    STRAINS,
-    Joints,
-    PackMaterial,
-    bond_springs,
-    contact_springs,
-    find_joints,
-    kinematics,
-    solver_of,
-    stiffness_matrix,
-)
+from fdnet.mechanics import springs
+from fdnet.mechanics.springs import STRAINS, Joints, PackMaterial
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
 LEAST_STIFFNESS = 1e-7
@@ -144,15 +135,15 @@ def elastic_of(
     joints, kept = carrying(grains, material, periodic)
     volume = float(np.prod(np.diff(grains.box, axis=1)))
     count, length = len(grains), float(grains.radius.mean()) if len(grains) else 1.0
-    contacts, pairs = contact_springs(joints, material), ~joints.at_wall
-    springs = contacts + bond_springs(joints, material)
-    maps = kinematics(joints, count, length=length)
-    pulled = springs.reshape(-1, 1) * maps.of_strain
+    contacts, pairs = springs.contact_springs(joints, material), ~joints.at_wall
+    stiff = contacts + springs.bond_springs(joints, material)
+    maps = springs.kinematics(joints, count, length=length)
+    pulled = stiff.reshape(-1, 1) * maps.of_strain
     affine = maps.of_strain.T @ pulled / volume
     moving, motion = np.repeat(kept, 6), np.zeros((6 * count, len(STRAINS)))
     if kept.any():
         live = maps.of_grains[:, np.flatnonzero(moving)]
-        solve, load = solver_of(stiffness_matrix(live, springs)), -(live.T @ pulled)
+        solve, load = springs.solver_of(springs.stiffness_matrix(live, stiff)), -(live.T @ pulled)
         motion[moving] = np.column_stack([solve(column) for column in load.T])
     tensor = affine + (pulled.T @ (maps.of_grains @ motion)) / volume
     tensor = 0.5 * (tensor + tensor.T)
@@ -188,7 +179,7 @@ def carrying(
     Grains with fewer than two joints are taken out until none is left, and so are groups that
     touch neither walls nor the largest group.
     """
-    joints, count = find_joints(grains, periodic, gap=material.gap), len(grains)
+    joints, count = springs.find_joints(grains, periodic, gap=material.gap), len(grains)
     kept = np.ones(count, bool)
     while True:
         live = kept[joints.first] & (joints.at_wall | kept[joints.second])

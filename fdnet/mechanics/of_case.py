@@ -10,13 +10,7 @@ from fdnet.errors import CaseError, Doubt
 from fdnet.mechanics.elastic import Elastic, elastic_of, voigt_average
 from fdnet.mechanics.springs import Cement, PackMaterial, find_joints, mean_force
 from fdnet.mechanics.triaxial import LoadStep, Sheared, Triaxial, triaxial
-from fdnet.scales.contacts import (
-    overlap_under,
-    pair_elastic,
-    secant_stiffness,
-    series,
-    tangential_stiffness,
-)
+from fdnet.scales import contacts
 from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Snapshot
 
@@ -176,8 +170,8 @@ def pack_material(case: Case, grains: Snapshot, pressure_Pa: float | None = None
     """
     one, bonds = case.grains, case.bonds
     if case.contact.model != "hertz":
-        normal = series(one.normal_stiffness_N_m, one.normal_stiffness_N_m)
-        shear = series(one.tangential_stiffness, one.tangential_stiffness)
+        normal = contacts.series(one.normal_stiffness_N_m, one.normal_stiffness_N_m)
+        shear = contacts.series(one.tangential_stiffness, one.tangential_stiffness)
     elif pressure_Pa is None:
         raise CaseError(
             "contact.model: 'hertz' contacts have no stiffness without a load; give "
@@ -186,11 +180,14 @@ def pack_material(case: Case, grains: Snapshot, pressure_Pa: float | None = None
     elif not np.any((joints := find_joints(grains, case.periodic)).branch):
         normal, shear = 1.0, 1.0
     else:
-        elastic, radius = pair_elastic(case, ("grain", "grain"), 1.0), 0.5 * one.mean_radius_m
+        elastic, radius = (
+            contacts.pair_elastic(case, ("grain", "grain"), 1.0),
+            0.5 * one.mean_radius_m,
+        )
         force = mean_force(grains, joints, pressure_Pa)
-        overlap = overlap_under(force, elastic.modulus, radius)
-        normal = 1.5 * secant_stiffness(elastic.modulus, radius, overlap)
-        shear = tangential_stiffness(elastic.shear, radius, overlap)
+        overlap = contacts.overlap_under(force, elastic.modulus, radius)
+        normal = 1.5 * contacts.secant_stiffness(elastic.modulus, radius, overlap)
+        shear = contacts.tangential_stiffness(elastic.shear, radius, overlap)
     cement = None
     if bonds is not None:
         strengths = bonds.tensile_strength_Pa, bonds.shear_strength_Pa

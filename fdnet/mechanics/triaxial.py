@@ -8,19 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from fdnet.errors import CaseError, MechanicsError
-from fdnet.mechanics.springs import (
-    CONTACT_GAP,
-    Joints,
-    Kinematics,
-    PackMaterial,
-    bond_springs,
-    bond_stress,
-    direct_solver,
-    disc_radius,
-    find_joints,
-    kinematics,
-    mean_force,
-)
+from fdnet.mechanics import springs
+from fdnet.mechanics.springs import CONTACT_GAP, Joints, Kinematics, PackMaterial
 from fdnet.spheres.snapshot import Array, Snapshot, one_line, resting
 
 SOUND, TENSION, SHEAR = 0, 1, 2
@@ -75,7 +64,7 @@ def at_rest(
     `relieved` takes the overlaps as the state without stress; otherwise they are compressed
     springs. Bonds hold no force yet.
     """
-    joints = find_joints(grains, periodic, gap=material.gap)
+    joints = springs.find_joints(grains, periodic, gap=material.gap)
     key, count = keys_of(joints, len(grains)), len(joints)
     order = np.argsort(key)
     touches = joints.overlap > -2 * CONTACT_GAP * joints.radius
@@ -192,8 +181,8 @@ def loaded_pack(
 
     Forces across the normal are turned with it, at their size.
     """
-    joints = find_joints(pack.grains, periodic, gap=max(REACH, material.gap))
-    maps = kinematics(joints, len(pack.grains), length=float(pack.grains.radius.mean()))
+    joints = springs.find_joints(pack.grains, periodic, gap=max(REACH, material.gap))
+    maps = springs.kinematics(joints, len(pack.grains), length=float(pack.grains.radius.mean()))
     key, kept = keys_of(joints, len(pack.grains)), pack.memory
     place = np.minimum(np.searchsorted(pack.key, key), max(0, len(pack.key) - 1))
     known = pack.key[place] == key if len(pack.key) else np.zeros(len(key), bool)
@@ -220,7 +209,7 @@ def loaded_pack(
         overlap=overlap,
         held=np.einsum("kij,kj->ki", maps.frame, memory.shear)[:, 1:],
         bond=np.where(whole, bond, 0.0),
-        springs=np.where(whole, bond_springs(joints, material), 0.0),
+        springs=np.where(whole, springs.bond_springs(joints, material), 0.0),
         limit=friction * material.normal * np.maximum(overlap, 0.0),
         volume=float(np.prod(np.diff(pack.grains.box, axis=1))),
     )
@@ -304,13 +293,13 @@ def _newton(
     """Change of the motion (6 N,) and of the `free` (F,) strains by the tangent stiffness."""
     of_grains, across = loaded.maps.of_grains, loaded.maps.of_strain[:, :3][:, free]
     joints, count = np.arange(len(forces.tangent)), of_grains.shape[1]
-    springs = sparse.bsr_matrix((forces.tangent, joints, np.arange(len(joints) + 1))).tocsr()
-    matrix = (of_grains.T @ springs @ of_grains).tocsr()
-    solve = direct_solver(matrix + load.drag * sparse.identity(count, format="csr"))
+    stiff = sparse.bsr_matrix((forces.tangent, joints, np.arange(len(joints) + 1))).tocsr()
+    matrix = (of_grains.T @ stiff @ of_grains).tocsr()
+    solve = springs.direct_solver(matrix + load.drag * sparse.identity(count, format="csr"))
     moved_by = solve(missing[:count])
     if not len(free):
         return moved_by, np.empty(0)
-    pulled = springs @ across
+    pulled = stiff @ across
     coupling = of_grains.T @ pulled
     reply = np.column_stack([solve(column) for column in coupling.T])
     own, square = across.T @ pulled - coupling.T @ reply, loaded.maps.length**2
@@ -356,7 +345,9 @@ def overloaded(loaded: LoadedPack, forces: JointForces) -> tuple[Array, Array]:
     cement = loaded.material.cement
     if cement is None:
         return np.zeros(len(loaded.joints)), np.full(len(loaded.joints), SOUND)
-    tension, shear = bond_stress(forces.bond, disc_radius(loaded.joints, loaded.material))
+    tension, shear = springs.bond_stress(
+        forces.bond, springs.disc_radius(loaded.joints, loaded.material)
+    )
     pulled = tension / cement.tensile_strength
     cut = shear / cement.shear_strength
     ratio = np.where(loaded.memory.whole, np.maximum(pulled, cut), 0.0)
@@ -515,14 +506,14 @@ def confined(
 
     Raises what `triaxial` raises.
     """
-    joints = find_joints(grains, periodic, gap=material.gap)
+    joints = springs.find_joints(grains, periodic, gap=material.gap)
     if len(joints) == 0:
         raise MechanicsError(
             f"pack of {len(grains)} grains has no contacts; make it denser, or bridge its gaps "
             "with bonds.gap_ratio"
         )
     stress, diameter = test.confining, 2 * float(grains.radius.mean())
-    overlap = mean_force(grains, joints, stress) / material.normal / diameter
+    overlap = springs.mean_force(grains, joints, stress) / material.normal / diameter
     if overlap > MOST_OVERLAP:
         raise CaseError(
             f"--confining-MPa: {stress / 1e6:g} presses grains {100 * overlap:.3g} % of a "

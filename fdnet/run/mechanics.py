@@ -11,14 +11,7 @@ from fdnet.case.file import case_from, read_case, recorded_case, set_keys
 from fdnet.dem.deck import snapshot_of
 from fdnet.errors import CaseError, explained
 from fdnet.files import write_text
-from fdnet.mechanics.of_case import (
-    elastic_moduli,
-    elastic_numbers,
-    triaxial_numbers,
-    triaxial_test,
-    triaxial_warnings,
-    warnings_of,
-)
+from fdnet.mechanics import of_case
 from fdnet.report.html import put_mechanics
 from fdnet.report.tables import plain_json, write_rows
 from fdnet.run.folder import CASE, START_OVER, check_files, is_run_folder, read_record
@@ -83,15 +76,15 @@ def packed_case(source: Path, options: RunOptions, assignments: list[str]) -> Pa
 def measure_elastic(packed: Packed, pressure_Pa: float | None) -> dict[str, Any]:
     """Elastic moduli of the pack as keys of mechanics.json, with warnings and seconds."""
     start, case = time.monotonic(), packed.case
-    result = elastic_moduli(packed.grains, case, pressure_Pa=pressure_Pa)
+    result = of_case.elastic_moduli(packed.grains, case, pressure_Pa=pressure_Pa)
     data = case.data()
     springs = {f"grains.{key}": data["grains"][key] for key in _SPRINGS if key in data["grains"]}
     return {
         "case": case.name,
         "seed": case.seed,
-        **elastic_numbers(result),
+        **of_case.elastic_numbers(result),
         "springs": springs | {f"bonds.{key}": one for key, one in data.get("bonds", {}).items()},
-        "warnings": [explained(one) for one in warnings_of(result, case)],
+        "warnings": [explained(one) for one in of_case.warnings_of(result, case)],
         "seconds": time.monotonic() - start,
     }
 
@@ -104,9 +97,9 @@ def measure_triaxial(packed: Packed, **test: Any) -> dict[str, Any]:
     from fdnet.report.figures import draw_stress_strain
 
     start = time.monotonic()
-    result = triaxial_test(packed.grains, packed.case, **test)
-    numbers = triaxial_numbers(result)
-    numbers["warnings"] = [explained(one) for one in triaxial_warnings(result)]
+    result = of_case.triaxial_test(packed.grains, packed.case, **test)
+    numbers = of_case.triaxial_numbers(result)
+    numbers["warnings"] = [explained(one) for one in of_case.triaxial_warnings(result)]
     numbers["seconds"] = time.monotonic() - start
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)

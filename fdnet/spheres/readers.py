@@ -14,20 +14,10 @@ import numpy as np
 
 from fdnet.errors import CaseError, DumpError
 from fdnet.files import LARGE, MARKS, expanded, file_bytes, replacing, text_of, unzipped
+from fdnet.spheres import snapshot
 from fdnet.spheres.dump import DumpReader, Head
 from fdnet.spheres.rows import Columns, SphereRows, columns_of, rows_from, scale_of
-from fdnet.spheres.snapshot import (
-    KIND_NAMES,
-    UNITS,
-    Array,
-    Directions,
-    Kind,
-    Snapshot,
-    checked_box,
-    grain_box,
-    metres_per,
-    periodic_axes,
-)
+from fdnet.spheres.snapshot import KIND_NAMES, UNITS, Array, Directions, Kind, Snapshot
 
 PLAIN = ("x", "y", "z", "radius")
 OWN_TYPES = {int(kind): name for name, kind in KIND_NAMES.items()}
@@ -36,7 +26,7 @@ _BEFORE_UNIT = re.compile(r"\s*([(\[])\s*")
 _FRACTION = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
-def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
+def write_spheres(path: str | Path, spheres: Snapshot) -> Path:
     """Write x_m, y_m, z_m, radius_m, kind, id; one row per sphere, atomically.
 
     Coordinates are the shortest decimals that read back to the same number (`repr`), so that a
@@ -44,10 +34,10 @@ def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
     """
     import pandas as pd
 
-    lengths = zip(PLAIN, (*snapshot.position.T, snapshot.radius), strict=True)
+    lengths = zip(PLAIN, (*spheres.position.T, spheres.radius), strict=True)
     frame = pd.DataFrame({f"{name}_m": values for name, values in lengths})
-    kinds = [OWN_TYPES[kind] for kind in snapshot.kind.tolist()]
-    frame = frame.assign(kind=kinds, id=snapshot.id)
+    kinds = [OWN_TYPES[kind] for kind in spheres.kind.tolist()]
+    frame = frame.assign(kind=kinds, id=spheres.id)
     with replacing(path) as part:
         frame.to_csv(part, index=False, lineterminator="\n")
     return Path(path)
@@ -192,7 +182,7 @@ def dump_spheres(
             f"{where}: its units are {head.units!r}, which fdnet cannot convert to m; give the "
             "unit of length of the file (units)"
         )
-    scale = DUMP_UNITS.get(head.units, 1.0) if units is None else metres_per(units)
+    scale = DUMP_UNITS.get(head.units, 1.0) if units is None else snapshot.metres_per(units)
     columns = columns_of(head.columns, where, dump=True)
     frame = reader.frame(head, columns.needed)
     notes = [f"The lengths of {source} are in m."] if units is None and not head.units else []
@@ -355,10 +345,10 @@ def read_sphere_file(
     """
     rows = _read_rows(path, units, step)
     kind, notes = _kinds(rows, fines_below, types)
-    bounds = rows.box if box is None else rows.scale * checked_box(box)
+    bounds = rows.box if box is None else rows.scale * snapshot.checked_box(box)
     around = bounds is None
     if bounds is None:
-        bounds = grain_box(rows.position, rows.radius, kind)
+        bounds = snapshot.grain_box(rows.position, rows.radius, kind)
         notes = [*notes, "The specimen is the box around all grains."]
     elif box is None:
         notes = [*notes, f"The specimen is the box of {rows.source}."]
@@ -387,7 +377,7 @@ def _sides(
     rows: SphereRows, box: Array, given: Directions | None
 ) -> tuple[tuple[bool, bool, bool] | None, list[str], list[str]]:
     """Which sides repeat, what was assumed of them, and where the file contradicts that."""
-    chosen = None if given is None else periodic_axes(given)
+    chosen = None if given is None else snapshot.periodic_axes(given)
     if not rows.boundary or rows.box is None:
         return chosen, [], []
     said, own = np.array(rows.boundary) == "pp", " ".join(rows.boundary)

@@ -7,7 +7,7 @@ import pytest
 from bench import bench
 from builders import resting_spheres, tiny
 
-from fdnet.dem import invade_deck
+from fdnet.dem import checkpoint
 from fdnet.dem.checkpoint import (
     Checkpoint,
     Deepest,
@@ -209,7 +209,7 @@ def test_the_deck_sees_the_overlap_of_an_impact(tmp_path):
 def test_watching_does_not_move_a_single_bit(go, tmp_path, monkeypatch):
     case = tiny("run.cap_ms=0.2")
     watched = go(case, tmp_path / "watched")
-    monkeypatch.setattr(invade_deck, "watch_variables", lambda *_: None)
+    monkeypatch.setattr(checkpoint, "watch_variables", lambda *_: None)
     alone = go(case, tmp_path / "alone")
     assert not (tmp_path / "alone" / "overlap.csv").exists()
     assert np.array_equal(watched.state.position, alone.state.position)
