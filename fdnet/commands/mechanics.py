@@ -33,7 +33,7 @@ def add_mechanics(commands: Any) -> None:
 
 
 def _mechanics(options: argparse.Namespace) -> int:
-    from fdnet.mechanics.triaxial import LoadStep, Triaxial
+    from fdnet.mechanics.triaxial import LoadStep
     from fdnet.run.mechanics import measure_elastic, measure_triaxial, packed_case, write_mechanics
     from fdnet.run.records import RunOptions
 
@@ -67,8 +67,8 @@ def _mechanics(options: argparse.Namespace) -> int:
     packed = packed_case(options.source, chosen, overrides_of(options))
     numbers = measure_elastic(packed, pressure)
     if options.triaxial:
-        test = Triaxial(confining=pressure or 0.0, strain=options.strain, steps=options.steps)
-        numbers["triaxial"] = measure_triaxial(packed, test, follow)
+        asked = {"confining_Pa": pressure, "strain": options.strain, "steps": options.steps}
+        numbers["triaxial"] = measure_triaxial(packed, **asked, follow=follow)
     path = write_mechanics(packed, numbers)
     for warning in [*numbers["warnings"], *numbers.get("triaxial", {}).get("warnings", [])]:
         print(f"fdnet: warning: {warning}", file=sys.stderr)

@@ -13,8 +13,7 @@ from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,7 +22,7 @@ import numpy as np
 from fdnet.case.case import Case, InvasionCase
 from fdnet.dem.deck import number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
-from fdnet.errors import CaseError, Doubt, DumpError, LiggghtsError, explained
+from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.files import write_text
 from fdnet.scales.clock import ARRIVALS, PRESSED, arrival_time, rises
 from fdnet.scales.contacts import two_digits_up
@@ -33,16 +32,13 @@ from fdnet.spheres.geometry import groups_apart, max_overlap
 from fdnet.spheres.snapshot import Snapshot
 
 HISTORY, UPDATES, WATCH = "history.csv", "updates.csv", "overlap.csv"
-DOUBTS = "doubts.txt"
-"""Warnings of the sessions that went on from an earlier checkpoint than they could."""
 _SUFFIXES = "dump|restart|npz|unreadable|record"
 
 
 class Checkpoint(NamedTuple):
-    """Numbers of fines after one chunk of an invasion: a row of its history.csv.
+    """Numbers of fines after one chunk (from 1) of an invasion: a row of its history.csv.
 
     Attributes:
-        chunk: number of the chunk, from 1.
         step: last step of the chunk.
         upstream: fines upstream of the face, with those that were removed there.
         invaded: fines inside the specimen.
@@ -61,12 +57,16 @@ class Checkpoint(NamedTuple):
     most_crossed: int
     quiet: int
 
+    @property
+    def waiting(self) -> int:
+        """Fines that are upstream."""
+        return self.upstream - self.removed_upstream
+
 
 class Cleaned(NamedTuple):
-    """Numbers of fines after one chunk of a clean-up: a row of its history.csv.
+    """Numbers of fines after one chunk (from 1) of a clean-up: a row of its history.csv.
 
     Attributes:
-        chunk: number of the chunk, from 1.
         step: last step of the chunk; it counts on from those of the invasion.
         inside: fines inside the specimen.
         out: fines that have come out since the clean-up began.
@@ -83,17 +83,13 @@ class Cleaned(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What a checkpoint was when its files were whole.
-
-    In SHA-256 but for `ranks`, `row` and `fdnet`.
+    """What a checkpoint was when its files were whole, in SHA-256 but for `ranks`, `row`, `fdnet`.
 
     Attributes:
         case: what the stage depends on.
         ranks: MPI ranks of LIGGGHTS.
         row: line of history.csv.
         overlap: the overlaps that were watched since the checkpoint before.
-        dump: the dump.
-        restart: the restart.
         updates: the updates of a coupled stage before the checkpoint.
         fluid: what the fluid of a coupled stage remembers; "" where that is nothing.
         fdnet: version of fdnet, whose forces these are; "" by a version that did not record it.
@@ -154,14 +150,8 @@ class Checkpoints:
 
         LIGGGHTS may have written later checkpoints meanwhile, which are recorded in their turn.
         """
-        record = Record(
-            case=self.digest,
-            ranks=ranks,
-            row=csv_row(row),
-            overlap=rows_digest(overlaps),
-            fdnet=fdnet_version(),
-            **self._digests(row.step),
-        )
+        seen, own = rows_digest(overlaps), self._digests(row.step)
+        record = Record(self.digest, ranks, csv_row(row), seen, **own, fdnet=version("fdnet"))
         self.store(row.step, record)
 
     def remove_restarts(self, step: int) -> None:
@@ -213,17 +203,14 @@ class Checkpoints:
 
     def holds(self, step: int, suffix: str) -> bool:
         """Whether the "dump" or "restart" of a checkpoint is as it was recorded."""
-        record = self.record(step)
-        try:
-            return file_digest(self.path(step, suffix)) == getattr(record, suffix, None)
-        except OSError:
-            return False
+        with suppress(OSError):
+            return file_digest(self.path(step, suffix)) == getattr(self.record(step), suffix, None)
+        return False
 
     def _is_whole(self, row: Any, record: Record) -> bool:
-        try:
+        with suppress(OSError):
             return self._digests(row.step).items() <= record._asdict().items()
-        except OSError:
-            return False
+        return False
 
     def cut(self, last: Any | None) -> None:
         """Remove what came after the checkpoint `last`; everything where there is none."""
@@ -233,11 +220,11 @@ class Checkpoints:
         if last is None:
             for name in (WATCH, UPDATES):
                 (self.folder / name).unlink(missing_ok=True)
+        else:
+            cut_watch(self.folder, last.step)
         rows = [row for row in read_rows(self.folder, self.kind) if last and row.step <= last.step]
         lines = [",".join(self.kind._fields), *map(csv_row, rows)]  # type: ignore[attr-defined]
         write_text(self.folder / HISTORY, "\n".join(lines) + "\n")
-        if last is not None:
-            cut_watch(self.folder, last.step)
 
     def refuse_another_way(self, ranks: int) -> None:
         """Raises CaseError when the cut stage was begun in a way that would give another result.
@@ -245,63 +232,22 @@ class Checkpoints:
         That is on another number of MPI ranks, or by another version of fdnet.
         """
         stage = "invasion" if self.stage == "invade" else "clean-up"
+        begun = f"{self.folder}: this {stage} was begun with"
         for step, _ in self.files("record"):
             record = self.record(step)
             if record is None or record.case != self.digest:
                 continue
             if record.ranks != ranks:
                 raise CaseError(
-                    f"{self.folder}: this {stage} "
-                    f"was begun with --np {record.ranks}, and --np {ranks} would give neither "
-                    f"result; continue with --np {record.ranks}, or start over with --force"
+                    f"{begun} --np {record.ranks}, and --np {ranks} would give neither result; "
+                    f"continue with --np {record.ranks}, or start over with --force"
                 )
-            if record.fdnet != fdnet_version():
-                begun = record.fdnet or "of an earlier version"
+            if record.fdnet != version("fdnet"):
                 raise CaseError(
-                    f"{self.folder}: this {stage} was begun with fdnet {begun}, and fdnet "
-                    f"{fdnet_version()} may make other forces; run it anew with --force, or "
+                    f"{begun} fdnet {record.fdnet or 'of an earlier version'}, and fdnet "
+                    f"{version('fdnet')} may make other forces; run it anew with --force, or "
                     "continue with the fdnet that began it"
                 )
-
-    def doubt(self, last: Any | None) -> None:
-        """Keep a warning where the stage goes on from an earlier checkpoint than it could.
-
-        It is kept until the stage is finished, in whichever session. A checkpoint that has no
-        record was cut itself, which needs no warning.
-        """
-        newest = max((step for step, _ in self.files("record")), default=0)
-        warnings = self.doubts()
-        if last is None and (newest or len(read_rows(self.folder, self.kind)) > 1):
-            warnings.append(
-                Doubt(
-                    "started-over",
-                    "no checkpoint of the cut run could be used, it was started over",
-                )
-            )
-        elif last is not None and newest > last.step:
-            warnings.append(
-                Doubt(
-                    "earlier-checkpoint",
-                    f"files of the cut run were not those that were recorded (checkpoint at step "
-                    f"{newest}): it went on from the checkpoint at step {last.step}",
-                )
-            )
-        if warnings:
-            text = "".join(f"{line}\n" for line in dict.fromkeys(map(explained, warnings)))
-            write_text(self.folder / DOUBTS, text)
-
-    def doubts(self) -> list[str]:
-        """The warnings that this and earlier sessions kept."""
-        return _whole_lines(self.folder / DOUBTS)
-
-
-@cache
-def fdnet_version() -> str:
-    """The version of fdnet that runs."""
-    try:
-        return version("fdnet")
-    except PackageNotFoundError:
-        return "not installed as a package"
 
 
 def file_digest(path: Path) -> str:
@@ -347,9 +293,8 @@ def read_history(folder: Path, kind: type = Checkpoint) -> tuple[Any, ...]:
     """
     rows = read_rows(folder, kind)
     if not rows:
-        raise LiggghtsError(
-            f"{folder / HISTORY}: no checkpoint recorded; see {folder}/screen.txt, run again"
-        )
+        seen = f"see {folder}/screen.txt, run again"
+        raise LiggghtsError(f"{folder / HISTORY}: no checkpoint recorded; {seen}")
     return rows
 
 
@@ -408,20 +353,17 @@ def quiet_enough(
     while mud is left at the face, and else the time of `empty_chunks`. Fewer than `ARRIVALS` fines
     are no mud: they say nothing of the face.
     """
-    waiting = row.upstream - row.removed_upstream
     follows = case.drag.coupled
-    mud = waiting >= ARRIVALS if follows else waiting > 0
+    mud = row.waiting >= (ARRIVALS if follows else 1)
     if row.quiet < (quiet_chunks(scales) if mud else empty_chunks(case, scales)):
         return False
-    return not follows or _speed_inside(folder, case, row) <= REST * scales.drive_velocity
-
-
-def _speed_inside(folder: Path, case: InvasionCase, row: Checkpoint) -> float:
-    """Mean velocity along the flow, m/s, of the fines inside at a checkpoint; 0 without any."""
-    fines = snapshot_of(read_frame(folder / "post" / f"invade_{row.step}.dump"), case, time_s=0.0)
-    depth = fines.fines().position[:, 0]
-    inside = (depth >= 0) & (depth < case.size_m[0])
-    return float(np.mean(fines.fines().velocity[inside, 0])) if inside.any() else 0.0
+    if not follows:
+        return True
+    frame = read_frame(folder / "post" / f"invade_{row.step}.dump")
+    fines = snapshot_of(frame, case, time_s=0.0).fines()
+    inside = (fines.position[:, 0] >= 0) & (fines.position[:, 0] < case.size_m[0])
+    speed = float(np.mean(fines.velocity[inside, 0])) if inside.any() else 0.0
+    return speed <= REST * scales.drive_velocity
 
 
 def flow_says(folder: Path, case: InvasionCase, scales: InvasionScales, step: int) -> str | None:
@@ -433,13 +375,13 @@ def flow_says(folder: Path, case: InvasionCase, scales: InvasionScales, step: in
     if case.run.stop_rate is None and case.run.stop_pore_volumes is None:
         return None
     rows = [row for row in read_updates(folder) if row["step"] < step]
-    rate, volumes = case.run.stop_rate, case.run.stop_pore_volumes
-    if rows and rate is not None and rows[-1]["rate_over_initial"] < rate:
+    if not rows:
+        return None
+    if case.run.stop_rate is not None and rows[-1]["rate_over_initial"] < case.run.stop_rate:
         return "plugged"
     pores = scales.porosity * math.prod(case.size_m)
-    if rows and volumes is not None and rows[-1]["filtrate_m3"] >= volumes * pores:
-        return "duration"
-    return None
+    most = (case.run.stop_pore_volumes or math.inf) * pores
+    return "duration" if rows[-1]["filtrate_m3"] >= most else None
 
 
 def time_of(row: Checkpoint, scales: InvasionScales) -> float:
@@ -491,11 +433,7 @@ def entered_by(case: InvasionCase, batches: Batches, row: Checkpoint) -> int:
 
 
 def state_at(
-    folder: Path,
-    row: Checkpoint | Cleaned,
-    case: InvasionCase,
-    scales: InvasionScales,
-    grains: Snapshot,
+    folder: Path, row: Any, case: InvasionCase, scales: InvasionScales, grains: Snapshot
 ) -> Snapshot:
     """Grains and remaining fines at a checkpoint of an invasion or a clean-up.
 
@@ -511,13 +449,11 @@ def state_at(
 def check_counts(folder: Path, row: Checkpoint, damaged: Snapshot, supplied: int) -> None:
     """Raises LiggghtsError when a state does not hold the fines that its checkpoint counts."""
     x = damaged.fines().position[:, 0]
-    inside = int(np.count_nonzero((x >= 0) & (x < damaged.box[0, 1])))
-    upstream = int(np.count_nonzero(x < 0))
-    if inside != row.invaded or upstream != row.upstream - row.removed_upstream:
+    inside, upstream = int(np.sum((x >= 0) & (x < damaged.box[0, 1]))), int(np.sum(x < 0))
+    if inside != row.invaded or upstream != row.waiting:
         raise LiggghtsError(
             f"{folder}/post/invade_{row.step}.dump: {inside} fines inside and {upstream} "
-            f"upstream, expected {row.invaded} and {row.upstream - row.removed_upstream} as in "
-            f"{HISTORY}"
+            f"upstream, expected {row.invaded} and {row.waiting} as in {HISTORY}"
         )
     if row.upstream + row.invaded + row.passed != supplied:
         raise LiggghtsError(
@@ -543,11 +479,10 @@ def readable_states(
     for row in history:
         try:
             state = state_at(folder, row, case, scales, grains)
-            record, dump = points.record(row.step), points.path(row.step, "dump")
-            if record is not None and file_digest(dump) != record.dump:
+            if points.record(row.step) and not points.holds(row.step, "dump"):
                 raise DumpError(
-                    f"{dump}: is not the dump that the run wrote; put it back, or start over with "
-                    "--force"
+                    f"{points.path(row.step, 'dump')}: is not the dump that the run wrote; put it "
+                    "back, or start over with --force"
                 )
         except DumpError:
             if row == history[-1]:
@@ -615,7 +550,7 @@ def write_watch_parts(case: InvasionCase, grains: Snapshot, folder: Path) -> Non
     if not is_watched(case):
         return
     groups = groups_apart(grains, case.periodic)
-    rows = [f"{grain:.0f} {group}" for grain, group in zip(grains.id, groups, strict=True)]
+    rows = [f"{grain} {group}" for grain, group in zip(grains.id, groups, strict=True)]
     write_text(folder / GRAINS_APART, "\n".join([str(len(rows)), *rows, ""]))
     if case.drag.coupled:
         write_text(folder / WATCHED, render_text("watched.in.j2", {}))
@@ -623,17 +558,12 @@ def write_watch_parts(case: InvasionCase, grains: Snapshot, folder: Path) -> Non
 
 def read_watch(folder: Path) -> list[Deepest]:
     """What the deck measured; nothing where it did not watch. Titles are passed over."""
-    return list(_watched(_whole_lines(folder / WATCH)))
-
-
-def _watched(lines: Iterable[str]) -> Iterator[Deepest]:
-    for line in lines:
-        step, comma, fraction = line.partition(",")
-        if comma and step.isdecimal() and len(step) < 19:
-            try:
-                yield Deepest(int(step), max(0.0, float(fraction)))
-            except ValueError:
-                yield Deepest(int(step), 0.0)
+    seen = []
+    for line in _whole_lines(folder / WATCH):
+        step, _, fraction = line.partition(",")
+        with suppress(ValueError):
+            seen.append(Deepest(int(step), max(0.0, float(fraction))))
+    return seen
 
 
 def cut_watch(folder: Path, last_step: int) -> None:

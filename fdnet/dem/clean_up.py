@@ -8,23 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fdnet.dem.checkpoint import (
-    HISTORY,
-    Checkpoints,
-    Cleaned,
-    read_history,
-    state_at,
-)
-from fdnet.dem.deck import (
-    BELOW_ZERO,
-    Deck,
-    drag_variables,
-    forces_left_out,
-    gravity_variables,
-    header_variables,
-    number,
-    render_text,
-)
+from fdnet.dem import deck
+from fdnet.dem.checkpoint import HISTORY, Checkpoints, Cleaned, read_history, state_at
+from fdnet.dem.deck import BELOW_ZERO, Deck, number
 from fdnet.dem.invade_deck import (
     DrivingFluid,
     coupled_parts,
@@ -70,11 +56,11 @@ def render_clean_up(
     `restart` is the path of the restart file that it begins with, from the folder of the deck.
     """
     case, scales = flow.case, flow.scales
-    gravity, left_out = gravity_variables(case, scales)
-    left_out += forces_left_out(case)
-    text = render_text(
+    gravity, left_out = deck.gravity_variables(case, scales)
+    left_out += deck.forces_left_out(case)
+    text = deck.render_text(
         "clean_up.in.j2",
-        header_variables(case, "invade", left_out, ranks)
+        deck.header_variables(case, "invade", left_out, ranks)
         | moving_variables(case, scales)
         | {
             "stage": "clean_up",
@@ -86,17 +72,12 @@ def render_clean_up(
             "resume": False,
             "regions": specimen_regions(case)
             | {"out": f"INF {number(BELOW_ZERO)} INF INF INF INF"},
-            "start": {
-                "chunk": last.chunk + 1 if last else 1,
-                "out": last.out if last else 0,
-                "passed": last.passed if last else 0,
-                "quiet": last.quiet if last else 0,
-            },
+            "start": last._replace(chunk=last.chunk + 1) if last else Cleaned(1, *[0] * 5),
             "chunks": flow.chunks,
             "quiet_chunks": flow.quiet_chunks,
         },
     )
-    return Deck(text=text, stage="clean_up", digest=digest, left_out=tuple(left_out))
+    return Deck(text, tuple(left_out))
 
 
 def turned_drag(flow: BackFlow) -> dict[str, Any]:
@@ -111,18 +92,13 @@ def turned_drag(flow: BackFlow) -> dict[str, Any]:
         upstream_velocity=-scales.upstream_velocity,
         push=replace(push, velocity=-push.velocity, gradient=-push.gradient, reynolds_slope=0.0),
     )
-    ahead, back = drag_variables(flow.case, scales), drag_variables(flow.case, turned)
+    ahead, back = deck.drag_variables(flow.case, scales), deck.drag_variables(flow.case, turned)
     return back | {"inertia": ahead["inertia"]} if "inertia" in ahead else back
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CleanUpStage(ChunkedStage):
-    """A clean-up as it is run.
-
-    Attributes:
-        flow: that is turned back.
-        start: what it begins with.
-    """
+    """A clean-up as it is run: the flow that is turned back, and what it begins with."""
 
     flow: BackFlow
     start: Start
@@ -148,14 +124,14 @@ class CleanUpStage(ChunkedStage):
             restart = f"../{start.invasion.name}/post/{path.name}"
         else:
             restart, name = f"post/clean_{last.step}.restart", f"{name}.resume"
-        deck = render_clean_up(self.flow, start.digest, restart, last, ranks=self.launch.ranks)
-        write_text(self.folder / name, deck.text)
+        made = render_clean_up(self.flow, start.digest, restart, last, ranks=self.launch.ranks)
+        write_text(self.folder / name, made.text)
         parts = coupled_parts(case, self.flow.scales)
         if parts:
-            parts["checkpoint.in"] = render_text("cleaned.in.j2", dump_variables(case))
+            parts["checkpoint.in"] = deck.render_text("cleaned.in.j2", dump_variables(case))
         for part, text in parts.items():
             write_text(self.folder / part, text)
-        return deck
+        return made
 
     def over(self, last: Cleaned) -> bool:
         """Whether the checkpoint `last` is the end."""
@@ -170,13 +146,10 @@ class CleanUpStage(ChunkedStage):
             return "duration", []
         if last.quiet >= self.flow.quiet_chunks:
             return "quiet", []
-        return "cap", [
-            Doubt(
-                "clean-up-at-its-cap",
-                "the clean-up stopped at its cap while fines still came out: give "
-                "clean_up.duration_ms",
-            )
-        ]
+        text = (
+            "the clean-up stopped at its cap while fines still came out: give clean_up.duration_ms"
+        )
+        return "cap", [Doubt("clean-up-at-its-cap", text)]
 
 
 def fines_inside(spheres: Snapshot) -> Array:
@@ -210,7 +183,7 @@ def clean_up(
         flow=flow,
         start=start,
     )
-    deck, runs = stage.drive()
+    made, runs = stage.drive()
     history = read_history(folder, Cleaned)
     last = history[-1]
     state = state_at(folder, last, flow.case, flow.scales, start.grains)
@@ -231,8 +204,8 @@ def clean_up(
         state=state,
         history=history,
         stop_reason=reason,
-        warnings=(*warnings, *stage.points.doubts()),
-        left_out=deck.left_out,
+        warnings=tuple(warnings),
+        left_out=made.left_out,
         runs=runs,
         ranks=launch.ranks,
         step_s=flow.step,

@@ -3,6 +3,7 @@
 import math
 from functools import cache
 from importlib.resources import files
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +18,7 @@ from fdnet.scales.contacts import material_of
 from fdnet.scales.drag import COEFFICIENT, EXPONENT
 from fdnet.scales.scales import InvasionScales, Scales
 from fdnet.spheres.dump import Frame
+from fdnet.spheres.geometry import wrapped
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 
 
@@ -31,18 +33,9 @@ class LeftOut(NamedTuple):
 
 
 class Deck(NamedTuple):
-    """A rendered deck.
-
-    Attributes:
-        text: LIGGGHTS input.
-        stage: "pack", "invade" or "clean_up".
-        digest: of what the stage depends on in its case.
-        left_out: what a general deck would have and this one does without.
-    """
+    """A rendered deck: LIGGGHTS input, and what a general deck would have and this one has not."""
 
     text: str
-    stage: str
-    digest: str
     left_out: tuple[LeftOut, ...]
 
 
@@ -82,9 +75,8 @@ def render_text(template: str, variables: dict[str, Any], *, folder: Path | None
     """
     unused = set(variables) - used_variables(template, folder)
     if unused:
-        raise DeckError(
-            f"{template}: variables offered but never used: {', '.join(sorted(unused))}"
-        )
+        names = ", ".join(sorted(unused))
+        raise DeckError(f"{template}: variables offered but never used: {names}")
     try:
         return _environment(folder).get_template(template).render(variables)
     except jinja2.UndefinedError as error:
@@ -112,14 +104,14 @@ def contact_variables(case: Case, scales: Scales, stage: str, *, friction: bool)
     names, contact = _MATERIALS[stage], case.contact
     size = len(names)
 
+    known, between = scales.contacts, list(product(names, names))
+    # two walls never touch: any value serves
+    pairs = [
+        known.get(f"{a}-{b}") or known.get(f"{b}-{a}") or known["grain-wall"] for a, b in between
+    ]
+
     def matrix(value: str) -> str:
-        """A value of all pairs, row by row; of two walls, which never touch, any value serves."""
-        known = scales.contacts
-        pairs = (
-            known.get(f"{a}-{b}") or known.get(f"{b}-{a}") or known["grain-wall"]
-            for a in names
-            for b in names
-        )
+        """A value of all pairs, row by row."""
         return " ".join(number(getattr(pair, value)) for pair in pairs)
 
     rolling = contact.rolling_friction if friction else None
@@ -176,9 +168,8 @@ def _cohesion(case: Case, stage: str) -> str:
     density, materials = case.contact.cohesion_J_m3, _MATERIALS[stage]
     if density is None or "fine" not in materials:
         return ""
-    return " ".join(
-        number(density if "fine" in (a, b) else 0.0) for a in materials for b in materials
-    )
+    pairs = product(materials, materials)
+    return " ".join(number(density if "fine" in pair else 0.0) for pair in pairs)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -198,8 +189,8 @@ def gravity_variables(
     if gravity.mode == "off" or size == 0:
         return [], [LeftOut(what, "switched off")]
     if gravity.mode == "auto" and scales.gravity_over_drag < gravity.negligible_below:
-        ratio, limit = scales.gravity_over_drag, gravity.negligible_below
-        why = f"gravity is {ratio:.1e} of the drag, below {limit:g}"
+        below = f"below {gravity.negligible_below:g}"
+        why = f"gravity is {scales.gravity_over_drag:.1e} of the drag, {below}"
         return [], [LeftOut(what, why)]
     groups = {"fines": {one.density for one in case.fines.components}}
     if case.grains.motion == "mobile":
@@ -213,16 +204,10 @@ def gravity_variables(
         # buoyancy over the cube of the radius, N/m3, as simulated
         rate = 4 / 3 * math.pi * fluid * scales.force_factor
         lifted = gravity.acceleration_m_s2 if mixed and gravity.buoyancy else ()
-        pulls.append(
-            {
-                "group": name,
-                "magnitude": number(abs(scales.force_factor * share) * size),
-                "direction": " ".join(
-                    number(turn * one / size + 0.0) for one in gravity.acceleration_m_s2
-                ),
-                "lift": [number(-rate * one + 0.0) for one in lifted],
-            }
-        )
+        way = [number(turn * one / size + 0.0) for one in gravity.acceleration_m_s2]
+        pull = {"group": name, "magnitude": number(abs(scales.force_factor * share) * size)}
+        lift = [number(-rate * one + 0.0) for one in lifted]
+        pulls.append(pull | {"direction": " ".join(way), "lift": lift})
     return pulls, [] if gravity.buoyancy else [LeftOut("buoyancy", "switched off")]
 
 
@@ -245,7 +230,6 @@ def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]
     """
     if case.drag.coupled:
         return {"coupled": True}
-    hold = scales.hold_steps if scales.hold_steps > 1 else 0
     coefficient = case.fluid.stokes_coefficient_Pa_s * case.drag.multiplier
     slower, slope = scales.drive_velocity - scales.upstream_velocity, scales.push.reynolds_slope
     shared = {
@@ -264,15 +248,11 @@ def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]
             "slower": number(-damping * slower) if slower else "",
             "face": number(BELOW_ZERO),
         }
-    schiller_naumann = {
-        "factor": number(COEFFICIENT),
-        "exponent": number(EXPONENT),
-        "reynolds": number(slope),
-    }
+    law = {"factor": COEFFICIENT, "exponent": EXPONENT, "reynolds": slope}
     return shared | {
         "fluid_x": f"(f_uf[1]-(x<0.0)*{number(slower)})" if slower else "f_uf[1]",
-        "hold_steps": hold,
-        "inertia": schiller_naumann if slope else None,
+        "hold_steps": scales.hold_steps if scales.hold_steps > 1 else 0,
+        "inertia": {name: number(value) for name, value in law.items()} if slope else None,
     }
 
 
@@ -331,12 +311,10 @@ def header_variables(
 def wall_variables(case: Case, stage: str, *, friction: bool) -> list[dict[str, Any]]:
     """Planes at the sides, and at both ends for grains that move; fines pass the ends freely."""
     size, law = case.size_m, wall_law(case, stage, friction=friction)
-    ends_hold = "all" if stage == "pack" else ("grains" if case.grains.motion == "mobile" else "")
-    sides_hold = (
-        ""
-        if case.box.sides == "periodic"
-        else ("all" if stage == "pack" or ends_hold else "fines")
-    )
+    mobile = case.grains.motion == "mobile"
+    ends_hold = "all" if stage == "pack" else "grains" if mobile else ""
+    sides_hold = "all" if stage == "pack" or mobile else "fines"
+    sides_hold = "" if case.box.sides == "periodic" else sides_hold
     return [
         {
             "id": f"w{'xyz'[axis]}{end}",
@@ -354,10 +332,9 @@ def wall_variables(case: Case, stage: str, *, friction: bool) -> list[dict[str, 
 def write_data(
     path: Path, spheres: Snapshot, *, bounds: Array, density: Array, types: int
 ) -> None:
-    """Write the spheres (N) as a LIGGGHTS data file.
+    """Write the spheres (N) as a LIGGGHTS data file of so many `types` of atoms.
 
-    `bounds` (3, 2) m are those of the simulation box, `density` (N,) is in kg/m3, `types` is the
-    number of atom types.
+    `bounds` (3, 2) m are those of the simulation box, `density` (N,) is in kg/m3.
     """
     lines = ["spheres", "", f"{len(spheres)} atoms", f"{types} atom types", ""]
     for (low, high), axis in zip(bounds, "xyz", strict=True):
@@ -390,17 +367,14 @@ def snapshot_of(frame: Frame, case: Case, *, time_s: float) -> Snapshot:
                 f"has {name} {frame.column(name)[bad]:g}, expected {expected}; the file was "
                 "changed, start over with --force"
             )
-    position = np.column_stack([frame.column(c) for c in "xyz"])
-    for axis, periodic in enumerate(case.periodic):
-        if periodic:
-            position[:, axis] = np.mod(position[:, axis], case.size_m[axis])
+    position, box = np.column_stack([frame.column(c) for c in "xyz"]), specimen_box(case)
     return Snapshot(
         step=frame.step,
         time_s=time_s,
-        box=specimen_box(case),
+        box=box,
         id=frame.column("id"),
         kind=frame.column("type"),
-        position=position,
+        position=wrapped(position, box, case.periodic),
         radius=frame.column("radius"),
         velocity=np.column_stack([frame.column(f"v{c}") for c in "xyz"]),
     )

@@ -10,7 +10,7 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 from itertools import islice
 from pathlib import Path
 from typing import Any, Protocol
@@ -18,30 +18,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.dem.checkpoint import (
-    Checkpoint,
-    chunks_of,
-    empty_chunks,
-    plug_allowance,
-    quiet_chunks,
-    watch_variables,
-    write_watch_parts,
-)
-from fdnet.dem.deck import (
-    BELOW_ZERO,
-    Deck,
-    LeftOut,
-    contact_variables,
-    drag_variables,
-    forces_left_out,
-    gravity_variables,
-    header_variables,
-    number,
-    render_text,
-    specimen_box,
-    wall_variables,
-    write_data,
-)
+from fdnet.dem import checkpoint, deck
+from fdnet.dem.checkpoint import Checkpoint
+from fdnet.dem.deck import BELOW_ZERO, Deck, LeftOut, number
 from fdnet.dem.packing import write_pack_inputs
 from fdnet.dem.supply import AT_ONCE, batches_of, densities, place_batches, slab_end
 from fdnet.errors import CaseError
@@ -93,10 +72,9 @@ class Moment:
         fresh: whether a chunk begins. What is answered then must follow from the spheres and the
             row before alone, so that a run that was cut gives the same.
         left: s, until the chunk ends, when they are looked at again in any case.
-        given: (N,) m/s, speed w at which each of the N fines would go by the forces that it has
-            now, in their order; 0 where it has none yet. None where it is not known.
-        density: (N,) kg/m3 of each of the N fines, in their order. None where all have that of the
-            case.
+        given: (N,) m/s, speed w at which each fine would go by the forces that it has now; 0 where
+            it has none yet. None where it is not known.
+        density: (N,) kg/m3 of each fine. None where all have that of the case.
     """
 
     step: int
@@ -166,14 +144,13 @@ def coupled_parts(case: InvasionCase, scales: InvasionScales) -> dict[str, str]:
     if not case.drag.coupled:
         return {}
     shown = dump_variables(case)
-    asked = {"dump_columns": SHOWN_COLUMNS, "dump_group": shown["dump_group"]}
-    counted = shown | {"allowance": plug_allowance(case, scales), "follows": True}
-    parts = {
-        "ask.in": render_text("ask.in.j2", asked | {"state": STATE}),
-        "fluid.in": render_text("fluid.in.j2", {}),
-        "checkpoint.in": render_text("checkpoint.in.j2", counted),
+    asked = {"dump_columns": SHOWN_COLUMNS, "dump_group": shown["dump_group"], "state": STATE}
+    counted = shown | {"allowance": checkpoint.plug_allowance(case, scales), "follows": True}
+    return {
+        "ask.in": deck.render_text("ask.in.j2", asked),
+        "fluid.in": deck.render_text("fluid.in.j2", {}),
+        "checkpoint.in": deck.render_text("checkpoint.in.j2", counted),
     }
-    return parts
 
 
 def dump_variables(case: InvasionCase) -> dict[str, str]:
@@ -186,28 +163,74 @@ def dump_variables(case: InvasionCase) -> dict[str, str]:
 # The files that a deck of an invasion reads: the first fines, and the batches that come later.
 
 
-def write_invade_inputs(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path, *, ranks: int = 1
-) -> Deck:
-    """Write in.invade, invade.data (grains and the first fines) and the batches that follow.
+@dataclass(frozen=True, eq=False)
+class InvadeInputs:
+    """What the files of an invasion follow from, and their folder."""
 
-    Raises CaseError when the slab cannot hold its fines.
-    """
-    spheres = grains.joined(write_batches(case, scales, grains, folder))
-    pairs, _ = touching_pairs(spheres, case.periodic)
-    if np.any(spheres.kind[pairs] == Kind.FINE):
-        raise CaseError(
-            "fines: a fine would start in contact; this is an fdnet fault, please report the case "
-            "and seed"
-        )
-    fines = densities(case, batches_of(case, scales).counts)[: len(spheres) - len(grains)]
-    density = np.concatenate([np.full(len(grains), case.grains.density_kg_m3), fines])
-    bounds = _bounds(case, scales, grains)
-    write_data(folder / "invade.data", spheres, bounds=bounds, density=density, types=3)
-    deck = render_invade(case, scales, grains, ranks=ranks)
-    write_text(folder / "in.invade", deck.text)
-    write_parts(case, scales, grains, folder)
-    return deck
+    case: InvasionCase
+    scales: InvasionScales
+    grains: Snapshot
+    folder: Path
+
+    def write(self, *, ranks: int = 1) -> Deck:
+        """Write in.invade, invade.data (grains and the first fines) and the batches that follow.
+
+        Raises CaseError when the slab cannot hold its fines.
+        """
+        case, scales, grains, folder = self.case, self.scales, self.grains, self.folder
+        spheres = grains.joined(self.write_batches())
+        pairs, _ = touching_pairs(spheres, case.periodic)
+        if np.any(spheres.kind[pairs] == Kind.FINE):
+            raise CaseError(
+                "fines: a fine would start in contact; this is an fdnet fault, please report the "
+                "case and seed"
+            )
+        made = render_invade(case, scales, grains, ranks=ranks)
+        write_text(folder / "in.invade", made.text)
+        write_parts(case, scales, grains, folder)
+        self._write_data("invade", spheres)
+        return made
+
+    def write_batches(self) -> Snapshot:
+        """Write the batches that are read before later chunks; the fines that are there at first.
+
+        Where the deposit slows the mud down they are written when they are due (`later_batch`).
+        """
+        batches = place_batches(self.case, self.scales, self.grains)
+        first = list(islice(batches, AT_ONCE))
+        if not self.case.drag.slowed:
+            for which, fines in enumerate(batches, AT_ONCE):
+                self.write_batch(which, fines, self.scales.upstream_velocity)
+        return reduce(Snapshot.joined, first)
+
+    def write_batch(self, which: int, fines: Snapshot, velocity: float) -> str:
+        """Write supply/batch_N.data and .in of batch N (from 0); it moves at `velocity` m/s.
+
+        Returns the name of the second file.
+        """
+        name = f"{SUPPLY}/batch_{which}"
+        (self.folder / SUPPLY).mkdir(exist_ok=True)
+        self._write_data(name, fines)
+        values = {
+            "name": name,
+            "first": int(fines.id[0]),
+            "last": int(fines.id[-1]),
+            "start_velocity": number(velocity),
+            "drag": deck.drag_variables(self.case, self.scales),
+        }
+        write_text(self.folder / f"{name}.in", deck.render_text("batch.in.j2", values))
+        return f"{name}.in"
+
+    def _write_data(self, name: str, spheres: Snapshot) -> None:
+        fine, grains = spheres.kind == Kind.FINE, self.grains
+        density = np.full(len(spheres), self.case.grains.density_kg_m3)
+        density[fine] = self._fine_density[spheres.id[fine] - (int(grains.id.max()) + 1)]
+        bounds, path = _bounds(self.case, self.scales, grains), self.folder / f"{name}.data"
+        deck.write_data(path, spheres, bounds=bounds, density=density, types=3)
+
+    @cached_property
+    def _fine_density(self) -> Array:
+        return densities(self.case, batches_of(self.case, self.scales).counts)
 
 
 def write_parts(
@@ -216,56 +239,7 @@ def write_parts(
     """Write the files that a deck of the invasion includes, apart from the batches."""
     for name, text in coupled_parts(case, scales).items():
         write_text(folder / name, text)
-    write_watch_parts(case, grains, folder)
-
-
-def write_batches(
-    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
-) -> Snapshot:
-    """Write the batches that are read before later chunks.
-
-    Where the deposit slows the mud down they are written when they are due (`later_batch`).
-    Returns the fines that are there from the start.
-    """
-    batches = place_batches(case, scales, grains)
-    first = list(islice(batches, AT_ONCE))
-    if not case.drag.slowed:
-        density = densities(case, batches_of(case, scales).counts)
-        for which, fines in enumerate(batches, AT_ONCE):
-            velocity = scales.upstream_velocity
-            write_batch(case, scales, grains, folder, which, fines, velocity, density)
-    return reduce(Snapshot.joined, first)
-
-
-def write_batch(
-    case: InvasionCase,
-    scales: InvasionScales,
-    grains: Snapshot,
-    folder: Path,
-    which: int,
-    fines: Snapshot,
-    velocity: float,
-    density: Array,
-) -> str:
-    """Write supply/batch_N.data and .in of batch `which` (from 0), which moves at `velocity` m/s.
-
-    `density` kg/m3 is that of the fines of all batches in the order of their ids. Returns the name
-    of the second file in the folder of the invasion.
-    """
-    name = f"{SUPPLY}/batch_{which}"
-    (folder / SUPPLY).mkdir(exist_ok=True)
-    own = density[fines.id.astype(int) - (int(grains.id.max()) + 1)]
-    bounds = _bounds(case, scales, grains)
-    write_data(folder / f"{name}.data", fines, bounds=bounds, density=own, types=3)
-    values = {
-        "name": name,
-        "first": int(fines.id[0]),
-        "last": int(fines.id[-1]),
-        "start_velocity": number(velocity),
-        "drag": drag_variables(case, scales),
-    }
-    write_text(folder / f"{name}.in", render_text("batch.in.j2", values))
-    return f"{name}.in"
+    checkpoint.write_watch_parts(case, grains, folder)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -306,48 +280,44 @@ def render_invade(
 
     Grains that are not `packed` stand for those of a pack that is not made yet.
     """
-    gravity, left_out = gravity_variables(case, scales)
-    left_out += [*forces_left_out(case), *_left_out(case, scales, ranks, packed)]
+    gravity, left_out = deck.gravity_variables(case, scales)
+    left_out += [*deck.forces_left_out(case), *_left_out(case, scales, ranks, packed)]
     batches = len(batches_of(case, scales).counts)
     behind = _bounds(case, scales, grains)[0, 0] + _margin(case, scales)
     sides = "INF INF INF INF"
-    text = render_text(
+    text = deck.render_text(
         "invade.in.j2",
-        header_variables(case, "invade", left_out, ranks)
+        deck.header_variables(case, "invade", left_out, ranks)
         | moving_variables(case, scales)
         | {
             "gravity": gravity,
-            "resume": resume
-            and {"restart": f"post/invade_{resume.step}.restart", "scratch": SCRATCH},
+            "resume": resume and {"restart": f"post/invade_{resume.step}.restart"},
+            "scratch": SCRATCH,
             "start_velocity": number(scales.upstream_velocity),
-            "drag": drag_variables(case, scales),
-            "overlap": watch_variables(case, scales, grains) if packed else None,
+            "drag": deck.drag_variables(case, scales),
+            "overlap": checkpoint.watch_variables(case, scales, grains) if packed else None,
             "regions": specimen_regions(case)
             | {
                 "upstream": f"{number(np.nextafter(behind, 0))} {number(BELOW_ZERO)} {sides}",
                 "behind": f"INF {number(behind)} {sides}",
             },
-            "quiet_checkpoints": quiet_chunks(scales),
-            "empty_checkpoints": empty_chunks(case, scales),
-            "allowance": plug_allowance(case, scales),
-            "start": {
-                "chunk": resume.chunk + 1 if resume else 1,
-                "passed": resume.passed if resume else 0,
-                "behind": resume.removed_upstream if resume else 0,
-                "most": resume.most_crossed if resume else 0,
-                "quiet": resume.quiet if resume else 0,
-            },
+            "quiet_checkpoints": checkpoint.quiet_chunks(scales),
+            "empty_checkpoints": checkpoint.empty_chunks(case, scales),
+            "allowance": checkpoint.plug_allowance(case, scales),
+            "start": resume._replace(chunk=resume.chunk + 1)
+            if resume
+            else Checkpoint(1, *[0] * 7),
             # the chunks that take in a batch of mud of constant velocity; in mud that slows down
             # they follow from the distance that it has moved
             "feeding": {"first": AT_ONCE, "last": batches - 1} if batches > AT_ONCE else None,
             "slowed": case.drag.slowed,
             "follows": case.drag.coupled,
             "supply": SUPPLY,
-            "chunks": chunks_of(case, scales),
+            "chunks": checkpoint.chunks_of(case, scales),
             "stop_when_plugged": case.run.duration_s is None,
         },
     )
-    return Deck(text=text, stage="invade", digest=case.digest("invade"), left_out=tuple(left_out))
+    return Deck(text, tuple(left_out))
 
 
 def moving_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:
@@ -359,9 +329,11 @@ def moving_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, An
     walls = _friction(case, scales, walls_only=True)
     return dump_variables(case) | {
         "skin": number(skin),
-        "contacts": contact_variables(case, scales, "invade", friction=_friction(case, scales)),
+        "contacts": deck.contact_variables(
+            case, scales, "invade", friction=_friction(case, scales)
+        ),
         "time_step": number(scales.time_step),
-        "walls": wall_variables(case, "invade", friction=walls),
+        "walls": deck.wall_variables(case, "invade", friction=walls),
         "fixed_grains": not mobile,
         "moving": "all" if mobile else "fines",
         "thermo_steps": max(1, scales.checkpoint_steps // 4),
@@ -428,11 +400,11 @@ def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     }
     invasion = {}
     if isinstance(case, InvasionCase):
-        radius, box = case.grains.radius_range_m[1], specimen_box(case)
+        radius, box = case.grains.radius_range_m[1], deck.specimen_box(case)
         grain = resting(np.array([[0.7 * radius, *(box[1:, 1] / 2)]]), radius, box)
         flow = invasion_scales(case)
-        deck = render_invade(case, flow, grain, ranks=ranks, packed=False)
-        invasion = {"in.invade": deck.text, **coupled_parts(case, flow)}
+        made = render_invade(case, flow, grain, ranks=ranks, packed=False)
+        invasion = {"in.invade": made.text, **coupled_parts(case, flow)}
     texts = {out / "invade" / name: text for name, text in invasion.items()}
     files = (decks["pack"], out / "pack" / "pack.data", *texts)
     there = [path for path in files if os.path.lexists(path)]

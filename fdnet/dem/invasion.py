@@ -11,57 +11,19 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from fdnet.case.case import InvasionCase
-from fdnet.dem.checkpoint import (
-    HISTORY,
-    WATCHED,
-    Checkpoint,
-    Checkpoints,
-    Deepest,
-    Updates,
-    chunks_of,
-    deepest_of,
-    entered_by,
-    flow_says,
-    is_watched,
-    lasting_overlap,
-    overlap_in,
-    overlap_text,
-    plug_allowance,
-    quiet_chunks,
-    quiet_enough,
-    read_history,
-    read_rows,
-    read_updates,
-    read_watch,
-    readable_states,
-    state_at,
-    steps_after,
-)
+from fdnet.dem import checkpoint, invade_deck
+from fdnet.dem.checkpoint import HISTORY, WATCHED, Checkpoint, Checkpoints, Deepest, Updates
 from fdnet.dem.deck import Deck, LeftOut, snapshot_of
-from fdnet.dem.invade_deck import (
-    GIVEN,
-    SCRATCH,
-    SUPPLY,
-    DrivingFluid,
-    Moment,
-    fine_density,
-    read_state,
-    render_invade,
-    write_batch,
-    write_batches,
-    write_forces,
-    write_invade_inputs,
-    write_parts,
-)
+from fdnet.dem.invade_deck import GIVEN, SCRATCH, SUPPLY, DrivingFluid, InvadeInputs, Moment
 from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
-from fdnet.dem.supply import batches_of, densities, later_batch
+from fdnet.dem.supply import batches_of, later_batch
 from fdnet.errors import CaseError, Doubt, LiggghtsError
 from fdnet.files import disk_is_full, write_text
 from fdnet.scales.clock import ARRIVALS, rises
@@ -77,8 +39,6 @@ class ChunkedStage(ABC):
     """A stage that is run in chunks of steps.
 
     Attributes:
-        case: what is run.
-        scales: of the case.
         grains: of the pack.
         points: its checkpoints, in its folder.
         launch: how LIGGGHTS is started.
@@ -145,11 +105,11 @@ class ChunkedStage(ABC):
         runs: tuple[Execution, ...] = ()
         while True:
             last = self.points.last()
-            self.points.doubt(last)
             self.points.cut(last)
             deck, name = self.write(last), self.deck if last is None else f"{self.deck}.resume"
             if last is not None:
-                self.look_at(read_history(self.folder, self.points.kind), read_watch(self.folder))
+                history = checkpoint.read_history(self.folder, self.points.kind)
+                self.look_at(history, checkpoint.read_watch(self.folder))
                 if self.over(last):
                     return deck, runs
             launch = replace(self.launch, follow=self.follow)
@@ -187,21 +147,17 @@ class ChunkedStage(ABC):
 
     def _keep(self, step: int) -> None:
         if disk_is_full(self.folder):
-            raise LiggghtsError(
-                f"{self.folder}: the disk is full, LIGGGHTS was stopped; make room and "
-                "continue with --resume"
-            )
-        past = [row for row in read_rows(self.folder, self.points.kind) if row.step <= step]
-        rows = [row for row in past if row.step == step][-1:]
-        since = max((row.step for row in past if row.step < step), default=-1)
-        overlaps = [one for one in read_watch(self.folder) if since < one.step <= step]
+            advice = "make room and continue with --resume"
+            raise LiggghtsError(f"{self.folder}: the disk is full, LIGGGHTS was stopped; {advice}")
+        every = checkpoint.read_rows(self.folder, self.points.kind)
+        rows = [row for row in every if row.step == step][-1:]
+        since = max((row.step for row in every if row.step < step), default=-1)
+        overlaps = [one for one in checkpoint.read_watch(self.folder) if since < one.step <= step]
         for row in rows:
             self.points.keep(row, ranks=self.launch.ranks, overlaps=overlaps)
         if not rows and self.points.stage == "invade" and self.case.run.on_overlap == "stop":
-            raise LiggghtsError(
-                f"{self.folder / HISTORY}: no row for the checkpoint at step {step}; continue "
-                "with --resume"
-            )
+            missing = f"no row for the checkpoint at step {step}; continue with --resume"
+            raise LiggghtsError(f"{self.folder / HISTORY}: {missing}")
         self.points.remove_restarts(step)
         self.look_at(rows, overlaps)
 
@@ -226,15 +182,10 @@ class ChunkedStage(ABC):
                 step, fresh = step + steps, False
             self.fluid.keep(self.points.path(step, "npz"))
             feed("include checkpoint.in")
-            last = read_history(self.folder, self.points.kind)[-1]
+            last = checkpoint.read_history(self.folder, self.points.kind)[-1]
 
     def _update(
-        self,
-        feed: Feed,
-        updates: Updates,
-        last: Any | None,
-        pace: InvasionScales,
-        left: int,
+        self, feed: Feed, updates: Updates, last: Any | None, pace: InvasionScales, left: int
     ) -> int:
         """Compute the fluid's forces in the chunk after `last`, of which `left` steps remain.
 
@@ -243,20 +194,20 @@ class ChunkedStage(ABC):
         done = pace.checkpoint_steps - left
         step = (last.step if last else self.first_step) + done
         time = self.time_at(last, done * self.scales.checkpoint_steps / pace.checkpoint_steps)
-        frame, dt = self.shown(feed), pace.time_step
-        spheres, density = self.spheres(frame, time), fine_density(frame)
+        frame = self.shown(feed)
+        spheres = self.spheres(frame, time)
         moment = Moment(
             step=step,
             time=time,
             before=updates.last,
             fresh=done == 0,
-            left=left * dt,
+            left=left * pace.time_step,
             given=np.linalg.norm([frame.column(one) for one in GIVEN], axis=0),
-            density=density,
+            density=invade_deck.fine_density(frame),
         )
         assert self.fluid is not None
         forces = self.fluid.forces(spheres, moment)
-        write_forces(self.folder, spheres, forces)
+        invade_deck.write_forces(self.folder, spheres, forces)
         updates.add(step, time, forces.measures)
         feed("include fluid.in")
         return min(steps_between(self.case, pace, forces.pace), left)
@@ -264,7 +215,7 @@ class ChunkedStage(ABC):
     def shown(self, feed: Feed) -> Frame:
         """The state that LIGGGHTS shows when it is asked."""
         feed("include ask.in")
-        return read_state(self.folder)
+        return invade_deck.read_state(self.folder)
 
     def spheres(self, frame: Frame, time: float) -> Snapshot:
         """All spheres of a state at a `time` s, fixed grains too."""
@@ -332,28 +283,32 @@ class Invasion(EndedStage):
 class InvadeStage(ChunkedStage):
     """An invasion as it is run."""
 
+    @cached_property
+    def inputs(self) -> InvadeInputs:
+        """The files that its deck reads."""
+        return InvadeInputs(self.case, self.scales, self.grains, self.folder)
+
     def write(self, last: Checkpoint | None) -> Deck:
         """Write the inputs of a start, or of a restart from `last`."""
-        case, scales, grains, folder = self.case, self.scales, self.grains, self.folder
         ranks = self.launch.ranks
         if last is None:
-            return write_invade_inputs(case, scales, grains, folder, ranks=ranks)
-        if case.fines.supply == "batches":
-            write_batches(case, scales, grains, folder)
+            return self.inputs.write(ranks=ranks)
+        if self.case.fines.supply == "batches":
+            self.inputs.write_batches()
         pace = self.pace(last)
-        write_parts(case, pace, grains, folder)
-        deck = render_invade(case, pace, grains, ranks=ranks, resume=last)
-        write_text(folder / f"{self.deck}.resume", deck.text)
+        invade_deck.write_parts(self.case, pace, self.grains, self.folder)
+        deck = invade_deck.render_invade(self.case, pace, self.grains, ranks=ranks, resume=last)
+        write_text(self.folder / f"{self.deck}.resume", deck.text)
         return deck
 
     def over(self, last: Checkpoint) -> bool:
         """Whether the checkpoint `last` is the end."""
         case, scales = self.case, self.scales
-        if last.chunk >= chunks_of(case, scales) or flow_says(
-            self.folder, case, scales, last.step
-        ):
+        said = checkpoint.flow_says(self.folder, case, scales, last.step)
+        if said or last.chunk >= checkpoint.chunks_of(case, scales):
             return True
-        return case.run.duration_s is None and quiet_enough(self.folder, case, scales, last)
+        timed = case.run.duration_s is not None
+        return not timed and checkpoint.quiet_enough(self.folder, case, scales, last)
 
     def pace(self, last: Checkpoint | None) -> InvasionScales:
         """The scales of the chunk after `last`, with springs that bear what the chunk before saw.
@@ -364,9 +319,9 @@ class InvadeStage(ChunkedStage):
         case, scales = self.case, self.scales
         if last is None or not rises(case):
             return scales
-        earlier = [one for one in read_rows(self.folder) if one.chunk < last.chunk]
+        earlier = [one for one in checkpoint.read_rows(self.folder) if one.chunk < last.chunk]
         begun = [0, 0, *(one.step for one in earlier)][-2:]
-        watched = read_watch(self.folder)
+        watched = checkpoint.read_watch(self.folder)
 
         def lasting(first: int, row: Checkpoint) -> float:
             seen = [one.fraction for one in watched if first < one.step <= row.step]
@@ -377,13 +332,13 @@ class InvadeStage(ChunkedStage):
                         "recorded, and the springs of the next chunk follow from it; put it back, "
                         "or start over with --force"
                     )
-                state = state_at(self.folder, row, case, scales, self.grains)
-                seen.append(overlap_in(case, state).fraction)
-            return lasting_overlap(seen)
+                state = checkpoint.state_at(self.folder, row, case, scales, self.grains)
+                seen.append(checkpoint.overlap_in(case, state).fraction)
+            return checkpoint.lasting_overlap(seen)
 
         before = lasting(begun[0], earlier[-1]) if earlier else 0.0
-        seen = lasting(begun[1], last)
-        return stiffened(case, scales, steps_after(case, last.step - begun[1], seen, before))
+        seen, steps = lasting(begun[1], last), last.step - begun[1]
+        return stiffened(case, scales, checkpoint.steps_after(case, steps, seen, before))
 
     def look_at(self, history: Sequence[Checkpoint], overlaps: Sequence[Deepest]) -> None:
         """Raise LiggghtsError when a fine overlapped too much and `run.on_overlap` is "stop".
@@ -393,21 +348,23 @@ class InvadeStage(ChunkedStage):
         case = self.case
         if case.run.on_overlap != "stop" or not history:
             return
-        states = readable_states(self.folder, history, case, self.scales, self.grains)
-        deepest = deepest_of([*overlaps, *(overlap_in(case, state) for _, state in states)])
+        states = checkpoint.readable_states(self.folder, history, case, self.scales, self.grains)
+        shown = [checkpoint.overlap_in(case, state) for _, state in states]
+        deepest = checkpoint.deepest_of([*overlaps, *shown])
         if deepest.fraction > case.run.max_overlap:
+            last = history[-1]
+            text = checkpoint.overlap_text(case, deepest, self.pace(last).stiffness)
             raise LiggghtsError(
-                f"{self.folder}: {overlap_text(case, deepest, self.pace(history[-1]).stiffness)}, "
-                f"and start over with --force; stopped at checkpoint {history[-1].chunk} (step "
-                f"{history[-1].step}) because of run.on_overlap = 'stop'; go on from here with "
-                "--resume --set run.on_overlap=warn (or a larger run.max_overlap)"
+                f"{self.folder}: {text}, and start over with --force; stopped at checkpoint "
+                f"{last.chunk} (step {last.step}) because of run.on_overlap = 'stop'; go on from "
+                "here with --resume --set run.on_overlap=warn (or a larger run.max_overlap)"
             )
 
     def begin_chunk(self, feed: Feed, updates: Updates, last: Checkpoint | None) -> None:
         """Feed the batches that are due, and the grains that are watched next."""
         case, scales = self.case, self.scales
         batches, chunk = batches_of(case, scales), last.chunk + 1 if last else 1
-        entered = entered_by(case, batches, last) if last else batches.entered_at(1)
+        entered = checkpoint.entered_by(case, batches, last) if last else batches.entered_at(1)
         if not case.drag.slowed:
             for which in range(entered, batches.entered_at(chunk)):
                 feed(f"include {SUPPLY}/batch_{which}.in")
@@ -419,13 +376,11 @@ class InvadeStage(ChunkedStage):
                 velocity = float(updates.last["velocity_m_s"])
                 moved = float(updates.last["filtrate_m3"]) / area + velocity * since
             ahead = velocity * scales.checkpoint_steps * scales.time_step
-            density = densities(case, batches.counts)
             for which in range(entered, batches.entered_after(moved + ahead)):
                 spheres = self.spheres(self.shown(feed), time)
                 fines = later_batch(case, scales, spheres, which, moved)
-                inputs = case, scales, self.grains, self.folder
-                feed(f"include {write_batch(*inputs, which, fines, velocity, density)}")
-        if is_watched(case):
+                feed(f"include {self.inputs.write_batch(which, fines, velocity)}")
+        if checkpoint.is_watched(case):
             feed(f"include {WATCHED}")
 
     def ending(self, history: Sequence[Checkpoint]) -> tuple[str, list[str]]:
@@ -435,52 +390,41 @@ class InvadeStage(ChunkedStage):
         `ARRIVALS` fines wait upstream. Mud without an end was cut off then.
         """
         case, scales, last = self.case, self.scales, history[-1]
-        waiting = last.upstream - last.removed_upstream
-        warnings: list[str] = []
-        reason = flow_says(self.folder, case, scales, last.step)
+        waiting, warnings = last.waiting, list[str]()
+        reason = checkpoint.flow_says(self.folder, case, scales, last.step)
         if reason is None and case.run.duration_s is not None:
             reason = "duration"
-        elif reason is None and quiet_enough(self.folder, case, scales, last):
+        elif reason is None and checkpoint.quiet_enough(self.folder, case, scales, last):
             reason = "mud_cut_off" if case.fines.endless else "supply_exhausted"
             reason = "plugged" if waiting >= ARRIVALS else reason
         elif reason is None:
-            reason, cap = "cap", scales.cap_time * scales.force_factor
-            warnings.append(
-                Doubt(
-                    "stopped-at-the-cap",
-                    f"invasion stopped at its cap of {1e3 * cap:.3g} ms before the stop rule "
-                    "held: raise run.cap_ms",
-                )
-            )
+            reason, cap = "cap", f"{1e3 * scales.cap_time * scales.force_factor:.3g} ms"
+            rule = "before the stop rule held: raise run.cap_ms"
+            text = f"invasion stopped at its cap of {cap} {rule}"
+            warnings.append(Doubt("stopped-at-the-cap", text))
         if case.fines.endless and (waiting == 0 or reason == "mud_cut_off"):
-            warnings.append(
-                Doubt(
-                    "mud-cut-off",
-                    f"the mud was cut off after {scales.supplied_count} fines "
-                    f"({1e3 * scales.slab_length:.3g} mm of mud): give fines.slab_mm for more",
-                )
+            text = (
+                f"the mud was cut off after {scales.supplied_count} fines "
+                f"({1e3 * scales.slab_length:.3g} mm of mud): give fines.slab_mm for more"
             )
+            warnings.append(Doubt("mud-cut-off", text))
         elif waiting == 0 or reason == "supply_exhausted":
             left = "no fine is left upstream: the end was decided by an empty slab"
             if waiting:
                 left = f"only {waiting} fines are left upstream, too few to call the face plugged"
             warnings.append(Doubt("empty-slab", f"{left}: raise fines.count or fines.slab_mm"))
-        before = history[-min(len(history), quiet_chunks(scales) + 1)]
-        if reason == "plugged" and last.passed - before.passed > plug_allowance(case, scales):
-            warnings.append(
-                Doubt(
-                    "still-leaving",
-                    f"the face was plugged, but {last.passed - before.passed} fines still left "
-                    "through the outlet meanwhile: raise run.plug_time_ms to follow them",
-                )
+        fled = (
+            last.passed - history[-min(len(history), checkpoint.quiet_chunks(scales) + 1)].passed
+        )
+        if reason == "plugged" and fled > checkpoint.plug_allowance(case, scales):
+            text = (
+                f"the face was plugged, but {fled} fines still left through the outlet meanwhile: "
+                "raise run.plug_time_ms to follow them"
             )
+            warnings.append(Doubt("still-leaving", text))
         if last.removed_upstream:
-            warnings.append(
-                Doubt(
-                    "bounced-out",
-                    f"{last.removed_upstream} fines bounced out upstream and were removed",
-                )
-            )
+            text = f"{last.removed_upstream} fines bounced out upstream and were removed"
+            warnings.append(Doubt("bounced-out", text))
         return reason, warnings
 
 
@@ -505,10 +449,10 @@ def invade(
         case=case, scales=scales, grains=grains, points=points, launch=launch, fluid=fluid
     )
     deck, runs = stage.drive()
-    history = read_history(folder)
+    history = checkpoint.read_history(folder)
     reason, warnings = stage.ending(history)
-    ended = _Ended(reason, warnings + points.doubts(), launch.ranks, deck.left_out, runs)
-    return _read(case, scales, grains, folder, history, ended)
+    ended = {"stop_reason": reason, "left_out": deck.left_out, "runs": runs}
+    return _read(case, scales, grains, points, history, warnings, **ended, ranks=launch.ranks)
 
 
 def invasion_so_far(
@@ -523,50 +467,45 @@ def invasion_so_far(
     record = None if last is None else points.record(last.step)
     if last is None or record is None:
         return None
-    history = tuple(row for row in read_history(folder) if row.step <= last.step)
-    ended = _Ended("unfinished", points.doubts(), record.ranks)
-    return _read(case, scales, grains, folder, history, ended)
-
-
-class _Ended(NamedTuple):
-    """How an invasion ended; the fields are those of `EndedStage`."""
-
-    stop_reason: str
-    warnings: list[str]
-    ranks: int
-    left_out: tuple[LeftOut, ...] = ()
-    runs: tuple[Execution, ...] = ()
+    history = tuple(row for row in checkpoint.read_history(folder) if row.step <= last.step)
+    ended = {"stop_reason": "unfinished", "left_out": (), "runs": ()}
+    return _read(case, scales, grains, points, history, [], **ended, ranks=record.ranks)
 
 
 def _read(
     case: InvasionCase,
     scales: InvasionScales,
     grains: Snapshot,
-    folder: Path,
+    points: Checkpoints,
     history: tuple[Checkpoint, ...],
-    ended: _Ended,
+    warnings: Sequence[str],
+    **ended: Any,
 ) -> Invasion:
-    """The invasion whose files are in `folder`, up to the last checkpoint of the `history`."""
-    batches, step = batches_of(case, scales), history[-1].step
-    overlaps, damaged = [], grains
-    for _, damaged in readable_states(folder, history, case, scales, grains):
-        overlaps.append(overlap_in(case, damaged))
+    """The invasion in the folder of its `points`, up to the last checkpoint of the `history`.
+
+    `ended` are the fields of `EndedStage` that no file tells.
+    """
+    folder, step, overlaps, damaged = points.folder, history[-1].step, [], grains
+    for _, damaged in checkpoint.readable_states(folder, history, case, scales, grains):
+        overlaps.append(checkpoint.overlap_in(case, damaged))
     if len(overlaps) < len(history):
-        ended.warnings.append(
-            Doubt(
-                "dumps-cannot-be-read",
-                f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be "
-                "read: they are missing from the largest overlap and from invasion.pvd",
-            )
+        text = (
+            f"{len(history) - len(overlaps)} of {len(history)} checkpoint dumps cannot be read: "
+            "they are missing from the largest overlap and from invasion.pvd"
         )
+        warnings = [*warnings, Doubt("dumps-cannot-be-read", text)]
     begun = history[-2].step if len(history) > 1 else 0
+    entered = checkpoint.entered_by(case, batches_of(case, scales), history[-1])
     return Invasion(
-        **ended._asdict() | {"warnings": tuple(ended.warnings)},
+        **ended,
         state=damaged,
         history=history,
+        warnings=tuple(warnings),
         last=stiffened(case, scales, step - begun),
-        supplied=batches.supplied(entered_by(case, batches, history[-1])),
-        overlap=deepest_of([*overlaps, *(one for one in read_watch(folder) if one.step <= step)]),
+        supplied=batches_of(case, scales).supplied(entered),
+        overlap=checkpoint.deepest_of(
+            [*overlaps, *(one for one in checkpoint.read_watch(folder) if one.step <= step)]
+        ),
         step_s=scales.time_step,
-        updates=tuple(row for row in read_updates(folder) if row["step"] < step),
+        updates=tuple(row for row in checkpoint.read_updates(folder) if row["step"] < step),
     )

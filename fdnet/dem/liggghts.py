@@ -208,14 +208,12 @@ class Binary:
     Attributes:
         path: of the binary.
         version: as it prints it.
-        launcher: the mpirun that belongs to it; None: one rank only.
-        template: words of another launcher, `{ranks}` among them; empty: `launcher` is taken.
+        launcher: words that start several ranks, `{ranks}` among them; None: one rank only.
     """
 
     path: Path
     version: str
-    launcher: Path | None
-    template: tuple[str, ...] = ()
+    launcher: tuple[str, ...] | None
 
     def command(self, deck: str | None, ranks: int) -> list[str]:
         """The command line for a deck in the current folder; None: for commands on stdin.
@@ -224,18 +222,15 @@ class Binary:
         """
         source = [] if deck is None else ["-in", deck]
         base = [str(self.path), *source, "-log", LOG]
-        stdbuf = shutil.which("stdbuf")
         if ranks == 1:
+            stdbuf = shutil.which("stdbuf")
             return ([stdbuf, "-oL"] if stdbuf else []) + base
-        if self.template:
-            return [word.replace(RANKS, str(ranks)) for word in self.template] + base
         if self.launcher is None:
             raise LiggghtsError(
                 f"--np {ranks}: no mpirun next to {self.path} or on PATH; install openmpi-bin or "
                 "use --np 1"
             )
-        options = ["--allow-run-as-root", "--oversubscribe", "-np", str(ranks)]
-        return [str(self.launcher), *options, *base]
+        return [word.replace(RANKS, str(ranks)) for word in self.launcher] + base
 
 
 def find_binary(option: str | None = None, *, launcher: str | None = None) -> Binary:
@@ -246,7 +241,7 @@ def find_binary(option: str | None = None, *, launcher: str | None = None) -> Bi
     Raises LiggghtsError when there is none, when it does not answer like LIGGGHTS, or when the
     launcher is not there; CaseError for a template without `{ranks}`.
     """
-    template = _template(launcher)
+    words = _template(launcher)
     given = os.path.expanduser(option or os.environ.get("FDNET_LIGGGHTS") or "")
     places = [given] if given else ["liggghts", str(_PROJECT / ".prefix" / "bin" / "liggghts")]
     scratch = os.environ.get("TMPDIR")
@@ -270,14 +265,15 @@ def find_binary(option: str | None = None, *, launcher: str | None = None) -> Bi
     path = Path(hit).absolute()
     own = path.parent / "mpirun"  # the binary was built with it
     mpirun = str(own) if own.exists() else shutil.which("mpirun") or shutil.which("orterun")
-    version, start = _version(path), Path(mpirun) if mpirun else None
-    return Binary(path=path, version=version, launcher=start, template=template)
+    if words is None and mpirun:
+        words = mpirun, "--allow-run-as-root", "--oversubscribe", "-np", RANKS
+    return Binary(path=path, version=_version(path), launcher=words)
 
 
-def _template(launcher: str | None) -> tuple[str, ...]:
+def _template(launcher: str | None) -> tuple[str, ...] | None:
     """The words of a launcher's template. Raises as `find_binary` does."""
     if launcher is None:
-        return ()
+        return None
     try:
         words = tuple(shlex.split(launcher))
     except ValueError as error:
@@ -314,14 +310,10 @@ def _version(path: Path) -> str:
     match = re.search(r"Version LIGGGHTS[-A-Z]*\s+([0-9.]+)", text)
     if not match:
         first = text.strip().splitlines()[:1]
-        if answer.returncode in (126, 127):
-            raise LiggghtsError(
-                f"{path}: a program or library that it needs was not found ({first}); check PATH "
-                f"({os.environ.get('PATH', '')!r}) and the set-up"
-            )
         raise LiggghtsError(
             f"{path}: does not answer like LIGGGHTS (exit {answer.returncode}, {first}); expected "
-            f"version {KNOWN_VERSION}, run scripts/setup.sh"
+            f"version {KNOWN_VERSION}, with all programs and libraries that it needs; run "
+            "scripts/setup.sh"
         )
     return match.group(1)
 
@@ -366,7 +358,7 @@ class Execution:
         version: of LIGGGHTS.
         seconds: s, from start to end.
         ranks: MPI ranks.
-        waited: s of them, in which LIGGGHTS waited for fdnet to compute something.
+        waited: s, in which LIGGGHTS waited for fdnet to compute something.
         cpu_seconds: s of processors, user and system, of LIGGGHTS on all ranks.
         peak_memory_bytes: largest resident memory of LIGGGHTS; None on several ranks.
     """
@@ -393,8 +385,7 @@ class Feed:
         process: its process.
         folder: that it runs in.
         screen: takes what it prints.
-        follow: is called with each line of that.
-        deadline: s of the monotonic clock; None: no limit.
+        launch: how it was started.
         busy: s, that it has worked on the commands.
         waited: s, in between.
         usage: what the process and its children used, known when it has ended.
@@ -404,8 +395,7 @@ class Feed:
     process: subprocess.Popen
     folder: Path
     screen: IO[bytes]
-    follow: Callable[[str], None] | None
-    deadline: float | None
+    launch: Launch
     busy: float = 0.0
     waited: float = 0.0
     usage: resource.struct_rusage | None = None
@@ -485,8 +475,8 @@ class Feed:
         lines = [line.rstrip(b"\r").decode(errors="replace") for line in parts]
         for line in lines:
             self._refuse_late()
-            if self.follow:
-                self.follow(line)
+            if self.launch.follow:
+                self.launch.follow(line)
         if not part and not lines:
             raise _EndedError
         return lines
@@ -501,7 +491,7 @@ class Feed:
         return self.process.returncode is not None
 
     def _refuse_late(self) -> None:
-        if self.deadline is not None and time.monotonic() > self.deadline:
+        if self.launch.deadline is not None and time.monotonic() > self.launch.deadline:
             raise LiggghtsError(
                 f"{self.folder}: LIGGGHTS did not end within its time limit and was stopped; "
                 "raise --timeout and continue with --resume"
@@ -547,20 +537,13 @@ def run_deck(
         started(folder, command, ranks=launch.ranks, fed=play is not None) as process,
         (folder / SCREEN).open("wb", buffering=0) as screen,
     ):
-        feed = Feed(
-            process=process,
-            folder=folder,
-            screen=screen,
-            follow=launch.follow,
-            deadline=launch.deadline,
-        )
+        feed = Feed(process=process, folder=folder, screen=screen, launch=launch)
         try:
             feed.play(play)
         finally:
-            for pipe in (process.stdin, process.stdout):
-                if pipe is not None:
-                    with contextlib.suppress(BrokenPipeError):
-                        pipe.close()
+            for pipe in filter(None, (process.stdin, process.stdout)):
+                with contextlib.suppress(BrokenPipeError):
+                    pipe.close()
     verify(folder, deck, process.returncode)  # no run that was cut short gets beyond this
     return Execution(
         directory=folder,

@@ -5,7 +5,6 @@ Small spheres are put at random, grown in stages, and relaxed until they are at 
 
 import json
 import math
-import os
 import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,18 +13,8 @@ from typing import Any
 import numpy as np
 
 from fdnet.case.case import Case
-from fdnet.dem.deck import (
-    Deck,
-    LeftOut,
-    contact_variables,
-    header_variables,
-    number,
-    render_text,
-    snapshot_of,
-    specimen_box,
-    wall_variables,
-    write_data,
-)
+from fdnet.dem import deck
+from fdnet.dem.deck import Deck, LeftOut, number
 from fdnet.dem.liggghts import SCREEN, Execution, Launch, run_deck
 from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.scales.contacts import restitution_of, sphere_mass
@@ -62,9 +51,9 @@ def write_pack_inputs(case: Case, folder: Path, *, count: int, places: int = 0) 
 
     `places` numbers the sets of random places that the same grains may start from.
     """
-    deck = render_pack(case, count=count)
-    (folder / "in.pack").write_text(deck.text)
-    radii, box = draw_radii(case, count), specimen_box(case)
+    made = render_pack(case, count=count)
+    (folder / "in.pack").write_text(made.text)
+    radii, box = draw_radii(case, count), deck.specimen_box(case)
     rng = np.random.default_rng([case.seed, count, *([places] if places else [])])
     small, size = PACK_START * radii, np.array(case.size_m)
     sides = 0.0 if case.box.sides == "periodic" else 1.0
@@ -72,8 +61,8 @@ def write_pack_inputs(case: Case, folder: Path, *, count: int, places: int = 0) 
     place = margin + rng.random((count, 3)) * (size - 2 * margin)
     density = np.full(count, case.grains.density_kg_m3)
     seeds = resting(place, small, box)
-    write_data(folder / "pack.data", seeds, bounds=box, density=density, types=2)
-    return deck
+    deck.write_data(folder / "pack.data", seeds, bounds=box, density=density, types=2)
+    return made
 
 
 def draw_radii(case: Case, count: int) -> Array:
@@ -120,18 +109,18 @@ def render_pack(case: Case, *, count: int) -> Deck:
         LeftOut("fines and fluid", "the pack is made before the invasion"),
         LeftOut("MPI processor grid", "one rank"),
     ]
-    contacts = contact_variables(case, scales, "pack", friction=False)
+    contacts = deck.contact_variables(case, scales, "pack", friction=False)
     damping = ("damping", 0.8 * math.sqrt(stiffness / mass))
     if case.contact.model == "hertz":
         damping = ("restitution", restitution_of(PACK_DAMPING))
     contacts[damping[0]] = " ".join([number(damping[1])] * contacts["size"] ** 2)
-    text = render_text(
+    text = deck.render_text(
         "pack.in.j2",
-        header_variables(case, "pack", left_out, 1)
+        deck.header_variables(case, "pack", left_out, 1)
         | {
             "skin": number(0.4 * low),
             "contacts": contacts,
-            "walls": wall_variables(case, "pack", friction=False),
+            "walls": deck.wall_variables(case, "pack", friction=False),
             "time_step": number(pack_step(case, contact)),
             "viscous": number(0.03 * math.sqrt(stiffness * mass)),
             "thermo_steps": RELAX_RUN_STEPS,
@@ -148,7 +137,7 @@ def render_pack(case: Case, *, count: int) -> Deck:
             "dump_format": FORMAT,
         },
     )
-    return Deck(text=text, stage="pack", digest=case.digest("pack"), left_out=tuple(left_out))
+    return Deck(text, tuple(left_out))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -172,18 +161,15 @@ class Pack:
     """A pack at rest, or nearly.
 
     Attributes:
-        grains: as packed.
-        porosity: overlaps counted once.
-        porosity_error: standard error of `porosity`.
+        porosity: overlaps counted once, with its standard error.
         porosity_sum: porosity by the plain sum of the spheres' volumes.
         max_overlap: largest overlap of two grains over the smaller diameter.
-        steps: of the last attempt.
-        step_s: s, time step.
+        steps: of the last attempt, of `step_s` s.
         attempts: one row for each number of grains that was tried.
-        restless: packs that did not come to rest, before others from the next random places did.
         left_out: what the deck does without.
         run: the execution of LIGGGHTS that made it.
         creep: m/s, root-mean-square speed of grains that never came to rest; 0 for a pack at rest.
+        restless: packs that did not come to rest, before others from the next random places did.
     """
 
     grains: Snapshot
@@ -219,17 +205,10 @@ def make_pack(case: Case, folder: Path, launch: Launch) -> Pack:
     while True:
         attempt = folder / f"attempt_{len(tried) + 1}"
         pack = _at_rest(case, attempt, launch, count=count)
-        tried.append(
-            {
-                "grains": len(pack.grains),
-                "porosity": pack.porosity,
-                "porosity_error": pack.porosity_error,
-                "max_overlap": pack.max_overlap,
-                "restless": pack.restless,
-                "liggghts_s": pack.run.seconds,
-                "liggghts_cpu_s": pack.run.cpu_seconds,
-            }
-        )
+        names = "porosity", "porosity_error", "max_overlap", "restless"
+        row = {"grains": len(pack.grains)} | {name: getattr(pack, name) for name in names}
+        spent = {"liggghts_s": pack.run.seconds, "liggghts_cpu_s": pack.run.cpu_seconds}
+        tried.append(row | spent)
         _refuse_overlap(case, pack)
         off = abs(pack.porosity - target) + pack.porosity_error
         if case.grains.count is not None or off <= POROSITY_TOLERANCE:
@@ -240,7 +219,7 @@ def make_pack(case: Case, folder: Path, launch: Launch) -> Pack:
         final = folder / path.name
         if final.is_dir():
             shutil.rmtree(final)
-        os.replace(path, final)
+        path.replace(final)
     attempt.rmdir()
     (folder / "attempts.json").write_text(json.dumps(tried, indent=1) + "\n")
     return replace(pack, attempts=tuple(tried), run=replace(pack.run, directory=folder))
@@ -249,17 +228,22 @@ def make_pack(case: Case, folder: Path, launch: Launch) -> Pack:
 def _refuse_overlap(case: Case, pack: Pack) -> None:
     if pack.max_overlap <= case.grains.max_overlap:
         return
-    key = "grains.porosity" if case.grains.count is None else "grains.count"
-    value = case.grains.porosity if case.grains.count is None else case.grains.count
     rigid, can_be = densest_porosity(case.grains), ""
     if pack.porosity < rigid:
         limit = within_limit(rigid, pack.porosity, pack.max_overlap, case.grains.max_overlap)
         can_be = f"{reach_text(rigid)}, and about {limit:.2f} within the limit: "
     raise CaseError(
-        f"{key}: {value} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a "
+        f"{_asked(case)} needs grains that overlap by {100 * pack.max_overlap:.1f} % of a "
         f"diameter (limit grains.max_overlap {case.grains.max_overlap:g}); "
         f"{can_be}take a looser pack or raise the limit"
     )
+
+
+def _asked(case: Case) -> str:
+    """The key that sets the number of grains, and its value."""
+    grains = case.grains
+    count = grains.count
+    return f"grains.porosity: {grains.porosity}" if count is None else f"grains.count: {count}"
 
 
 def _next_count(case: Case, target: float, tried: list[dict[str, Any]]) -> int:
@@ -270,21 +254,20 @@ def _next_count(case: Case, target: float, tried: list[dict[str, Any]]) -> int:
     """
     grain = case.grains.mean_volume_m3 / math.prod(case.size_m)
     nearest = sorted(tried, key=lambda row: abs(row["porosity"] - target))
-    slope = -grain
-    if len(nearest) > 1 and nearest[0]["grains"] != nearest[1]["grains"]:
-        secant = (nearest[0]["porosity"] - nearest[1]["porosity"]) / (
-            nearest[0]["grains"] - nearest[1]["grains"]
-        )
+    slope, best = -grain, nearest[0]
+    if len(nearest) > 1 and best["grains"] != nearest[1]["grains"]:
+        secant = best["porosity"] - nearest[1]["porosity"]
+        secant /= best["grains"] - nearest[1]["grains"]
         slope = min(max(secant, -1.5 * grain), -0.4 * grain)
-    guess = round(nearest[0]["grains"] + (target - nearest[0]["porosity"]) / slope)
+    guess = round(best["grains"] + (target - best["porosity"]) / slope)
     done = {row["grains"] for row in tried}
     near = (guess, guess + 1, guess - 1, guess + 2, guess - 2)
     around = [count for count in near if count > 0 and count not in done]
     if not around or len(tried) >= ATTEMPTS:
         raise CaseError(
             f"grains.porosity: {target} not met within {POROSITY_TOLERANCE} after {len(tried)} "
-            f"packs, nearest {nearest[0]['porosity']:.4f} with {nearest[0]['grains']} grains (one "
-            f"grain is {grain:.4f}); use a larger box, another seed, or give grains.count"
+            f"packs, nearest {best['porosity']:.4f} with {best['grains']} grains (one grain is "
+            f"{grain:.4f}); use a larger box, another seed, or give grains.count"
         )
     return around[0]
 
@@ -306,21 +289,20 @@ def _attempt(case: Case, folder: Path, launch: Launch, *, count: int, places: in
     if folder.exists():
         shutil.rmtree(folder)
     (folder / "post").mkdir(parents=True)
-    deck = write_pack_inputs(case, folder, count=count, places=places)
+    made = write_pack_inputs(case, folder, count=count, places=places)
     step = pack_step(case, packing_scales(case).contacts["grain-grain"])
     try:
         run = run_deck(folder, "in.pack", launch)
     except LiggghtsError as error:
         if "Lost atoms" not in str(error):
             raise
-        key = "grains.porosity" if case.grains.count is None else "grains.count"
         raise CaseError(
-            f"{key}: {count} grains needs more room than the box has, some were pushed out of it "
-            "while growing; raise the porosity, lower the count or enlarge the box"
+            f"{_asked(case)} makes {count} grains, too many for the box: some were pushed out "
+            "of it while growing; raise the porosity, lower the count or enlarge the box"
         ) from error
     dump = folder / "post" / "pack.dump"
     frame = read_frame(dump)
-    grains = snapshot_of(frame, case, time_s=0.0)
+    grains = deck.snapshot_of(frame, case, time_s=0.0)
     restless = "FDNET restless" in (folder / SCREEN).read_text("utf-8", errors="replace")
     creep = creep_of(case, step, folder, grains) if restless else 0.0
     if len(grains) != count:
@@ -336,7 +318,7 @@ def _attempt(case: Case, folder: Path, launch: Launch, *, count: int, places: in
         steps=frame.step,
         step_s=step,
         attempts=(),
-        left_out=deck.left_out,
+        left_out=made.left_out,
         run=run,
         creep=creep,
         restless=places,

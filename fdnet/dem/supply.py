@@ -6,12 +6,12 @@ the next one begins, in the whole slab at once: a batch that is filled before it
 leave no place for large ones at their boundary.
 
 Rounds in which every sphere without a place is drawn again leave the last ones over by chance. So
-each of these is drawn many more times (`last_places`) before it counts as one without a place.
+each of these is drawn many more times before it counts as one without a place.
 """
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,8 +22,8 @@ from fdnet.errors import CaseError
 from fdnet.scales.clock import ARRIVALS
 from fdnet.scales.scales import InvasionScales
 from fdnet.sizes import dealt
-from fdnet.spheres.geometry import wrapped
-from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from fdnet.spheres.geometry import in_period, wrapped
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 
 CLEARANCE = 1.02
 """Fines start at least this many radius sums apart."""
@@ -43,11 +43,10 @@ NOBODY = (np.empty((0, 3)), np.empty(0))
 def places_by_size(
     radius: Array,
     low: Array,
-    high: Array,
+    width: Array,
     size: Array,
     *,
     rng: np.random.Generator,
-    width: Array | None = None,
     others: tuple[Array, Array] = NOBODY,
     patient: bool = True,
     at_once: bool = False,
@@ -60,10 +59,9 @@ def places_by_size(
     Args:
         radius: (N,) m.
         low: (N, 3) m, smallest coordinates of each centre.
-        high: (N, 3) m, largest ones.
+        width: (N, 3) m, from these to the largest ones.
         size: (3,) m, period along each axis, 0 where there is none.
         rng: gives the places.
-        width: (N, 3) m, from `low` to `high`, where it was rounded otherwise.
         others: places (M, 3) m and radii (M,) m of spheres that are there already.
         patient: whether the last spheres of a class are drawn `LAST_TRIES` times.
         at_once: whether all sizes are one class.
@@ -72,7 +70,6 @@ def places_by_size(
         Places (N, 3) m, and how many spheres got none; those places mean nothing then.
     """
     count = len(radius)
-    width = high - low if width is None else width
     place = np.concatenate([np.empty((count, 3)), others[0]])
     done = np.arange(len(place)) >= count
     radius = np.concatenate([radius, others[1]])
@@ -85,14 +82,9 @@ def places_by_size(
             clear = _clear(place, radius, waiting, np.flatnonzero(done), size)
             done[waiting[clear]] = True
             waiting = waiting[~clear]
-        if patient and few(len(waiting), count):
-            last = last_places(
-                radius[waiting],
-                (low[waiting], high[waiting]),
-                size,
-                rng=rng,
-                others=(place[done], radius[done]),
-            )
+        if patient and 0 < len(waiting) <= max(1.0, LAST_SHARE * count):
+            left = radius[waiting], low[waiting], width[waiting]
+            last = _last_places(*left, size, rng, (place[done], radius[done]))
             place[waiting[: len(last)]], done[waiting[: len(last)]] = last, True
             waiting = waiting[len(last) :]
         if len(waiting):
@@ -100,37 +92,28 @@ def places_by_size(
     return place[:count], 0
 
 
-def few(waiting: int, count: int) -> bool:
-    """Whether the `waiting` ones of `count` spheres are the last ones."""
-    return 0 < waiting <= max(1.0, LAST_SHARE * count)
-
-
-def last_places(
-    radius: Array,
-    span: tuple[Array, Array],
+def _last_places(
+    radii: Array,
+    lows: Array,
+    widths: Array,
     size: Array,
-    *,
     rng: np.random.Generator,
     others: tuple[Array, Array],
 ) -> Array:
     """Places (K, 3) m of the first K spheres, each clear of the ones before it and of `others`.
 
     K is N, or as many as there are before the first one that `LAST_TRIES` draws give no place.
-
-    `radius` (N,) m is that of each, `span` the smallest and largest coordinates (N, 3) m of each
-    centre. For the other arguments see `places_by_size`.
     """
     from scipy.spatial import cKDTree
 
     place, there = others
-    for one, low, high in zip(radius, *span, strict=True):
+    for one, low, width in zip(radii, lows, widths, strict=True):
         tree = cKDTree(place, boxsize=size)
         reach = CLEARANCE * (one + float(there.max(initial=0.0)))
         for _ in range(LAST_TRIES // _BLOCK):
-            drawn = low + rng.random((_BLOCK, 3)) * (high - low)
-            near = cKDTree(drawn, boxsize=size).sparse_distance_matrix(
-                tree, reach, output_type="ndarray"
-            )
+            drawn = low + rng.random((_BLOCK, 3)) * width
+            other = cKDTree(drawn, boxsize=size)
+            near = other.sparse_distance_matrix(tree, reach, output_type="ndarray")
             clear = np.ones(_BLOCK, bool)
             clear[near["i"][near["v"] < CLEARANCE * (one + there[near["j"]])]] = False
             if clear.any():
@@ -160,11 +143,8 @@ def _clear(
     clear = np.ones(len(drawn), bool)
     tree, reach = cKDTree(place[drawn], boxsize=size), CLEARANCE * radius[drawn].max()
     if len(others):
-        near = tree.sparse_distance_matrix(
-            cKDTree(place[others], boxsize=size),
-            reach + CLEARANCE * radius[others].max(),
-            output_type="ndarray",
-        )
+        there, most = cKDTree(place[others], boxsize=size), CLEARANCE * radius[others].max()
+        near = tree.sparse_distance_matrix(there, reach + most, output_type="ndarray")
         least = CLEARANCE * (radius[drawn[near["i"]]] + radius[others[near["j"]]])
         clear[near["i"][near["v"] < least]] = False
     near = tree.sparse_distance_matrix(tree, 2 * reach, output_type="ndarray")
@@ -193,13 +173,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Batches:
-    """How a slab is cut.
-
-    Attributes:
-        counts: number of fines in each batch.
-        length: m, of each batch along the flow.
-        travel: m, that the suspension moves in a chunk.
-    """
+    """How a slab is cut: fines in each batch, its length, the way of mud in a chunk, both m."""
 
     counts: tuple[int, ...]
     length: float
@@ -224,9 +198,8 @@ class Batches:
 
         They are all batches where not even these hold so many.
         """
-        totals = np.cumsum(self.counts)
-        needed = int(np.searchsorted(totals, fines)) + 1
-        return min(len(totals), max(needed, self.entered_at(1)))
+        needed = int(np.searchsorted(np.cumsum(self.counts), fines)) + 1
+        return min(len(self.counts), max(needed, self.entered_at(1)))
 
     def supplied(self, entered: int) -> int:
         """Fines in the first batches, `entered` of them."""
@@ -281,9 +254,9 @@ def drawn_fines(case: InvasionCase, counts: Sequence[int]) -> list[Drawn]:
     missing = count - sum(numbers)
     for index in sorted(range(len(exact)), key=lambda i: numbers[i] - exact[i])[:missing]:
         numbers[index] += 1
-    parts = list(zip(fines, numbers, strict=True))
+    parts = zip(fines, numbers, strict=True)
     radius = np.concatenate([0.5 * one.curve.strata(number) for one, number in parts])
-    density = np.concatenate([np.full(number, one.density) for one, number in parts])
+    density = np.repeat([one.density for one in fines], numbers)
     rng = np.random.default_rng([case.seed, 13])
     return [Drawn(radius[index], density[index]) for index in dealt(counts, rng)]
 
@@ -357,9 +330,9 @@ def place_batches(
     measured sizes, of which each batch gets its part of the whole. Raises CaseError when the slab
     cannot hold its fines without overlap.
     """
-    batches, first = batches_of(case, scales), int(grains.id.max()) + 1
+    travel, first = batches_of(case, scales).travel, int(grains.id.max()) + 1
     for number, (place, radius) in enumerate(_draw(case, scales, end=slab_end(case, grains))):
-        carried = max(0, number + 1 - AT_ONCE) * batches.travel
+        carried = max(0, number + 1 - AT_ONCE) * travel
         yield _moving(scales, grains, place + np.array([carried, 0.0, 0.0]), radius, first)
         first += len(radius)
 
@@ -368,18 +341,9 @@ def _moving(
     scales: InvasionScales, grains: Snapshot, position: Array, radius: Array, first: int
 ) -> Snapshot:
     """Fines that move with the mud; `first` is the id of the first one."""
-    velocity = np.zeros((len(radius), 3))
-    velocity[:, 0] = scales.upstream_velocity
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=grains.box,
-        id=np.arange(first, first + len(radius)),
-        kind=np.full(len(radius), Kind.FINE),
-        position=position,
-        radius=radius,
-        velocity=velocity,
-    )
+    fines = resting(position, radius, grains.box, Kind.FINE)
+    velocity = fines.velocity + np.array([scales.upstream_velocity, 0.0, 0.0])
+    return replace(fines, id=fines.id + (first - 1), velocity=velocity)
 
 
 def later_batch(
@@ -401,17 +365,15 @@ def later_batch(
     high = slab_end(case, grains) + moved - number * batches.length
     some = there.where(there.position[:, 0] < high + 2.5 * case.fines.radius_range_m[1])
     place = wrapped(some.position, spheres.box, case.periodic)
-    # rounding may leave a wrapped place at the size itself
-    others = (np.where((period > 0) & (place >= period), 0.0, place), some.radius)
+    others = in_period(place, period), some.radius
     own = min(batches.length, scales.slab_length - number * batches.length)
     lost, lengths = 0, np.linspace(own, 2.0 * batches.length, 5)
     # the last fines of a batch that has its full length are drawn many more times
     for length, patient in [*((one, False) for one in lengths), (lengths[-1], True)]:
         low, most = margin.copy(), size - margin
         low[:, 0], most[:, 0] = high - length, high
-        place, lost = places_by_size(
-            radius, low, most, period, rng=rng, others=others, patient=patient
-        )
+        room = low, most - low, period
+        place, lost = places_by_size(radius, *room, rng=rng, others=others, patient=patient)
         if not lost:
             first = int(grains.id.max()) + 1 + batches.supplied(number)
             return _moving(scales, grains, place, radius, first)
@@ -446,7 +408,8 @@ def _draw(
         low, high = np.zeros((len(every), 3)), np.tile(size, (len(every), 1))
         low[:, 0], high[:, 0] = lows[batch], highs[batch]
         rng = np.random.default_rng([case.seed, 11])
-        place, lost = places_by_size(every, low + margin, high - margin, period, rng=rng)
+        width = (high - margin) - (low + margin)
+        place, lost = places_by_size(every, low + margin, width, period, rng=rng)
         _refuse_lost(case, lost, len(every), scales.slab_length)
         yield from zip(np.split(place, np.cumsum(batches.counts)[:-1]), radii, strict=True)
         return
@@ -455,25 +418,17 @@ def _draw(
         radius = rng.uniform(*case.fines.radius_range_m, count)
         size, period, margin = _across(case, radius)
         size[0], corner = highs[number] - lows[number], np.array([lows[number], 0.0, 0.0])
-        place, lost = places_by_size(
-            radius,
-            margin,
-            size - margin,
-            period,
-            rng=rng,
-            width=size - 2 * margin,
-            others=(before[0] - corner, before[1]),
-            at_once=True,
-        )
+        room, others = (margin, size - 2 * margin, period), (before[0] - corner, before[1])
+        place, lost = places_by_size(radius, *room, rng=rng, others=others, at_once=True)
         _refuse_lost(case, lost, count, size[0])
-        before = (place + corner, radius)
+        before = place + corner, radius
         yield before
 
 
 def _refuse_lost(case: InvasionCase, lost: int, count: int, length: float) -> None:
     if lost:
+        or_longer = "" if case.fines.endless else " or lengthen fines.slab_mm"
         raise CaseError(
             f"{concentration_text(case.fines)} leaves {lost} of {count} fines without a place in "
-            f"a slab of {1e3 * length:.3g} mm; lower it"
-            + ("" if case.fines.endless else " or lengthen fines.slab_mm")
+            f"a slab of {1e3 * length:.3g} mm; lower it{or_longer}"
         )

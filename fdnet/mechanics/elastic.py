@@ -12,26 +12,43 @@ from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from fdnet.errors import MechanicsError
-from fdnet.mechanics.springs import (
-    STRAINS,
-    Joints,
-    Moduli,
-    PackMaterial,
-    anisotropy_of,
-    bond_springs,
-    contact_springs,
-    find_joints,
-    kinematics,
-    solver_of,
-    stiffness_matrix,
-    voigt_average,
-    young_along,
-)
+from fdnet.mechanics import springs
+from fdnet.mechanics.springs import STRAINS, Joints, PackMaterial
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
 LEAST_STIFFNESS = 1e-7
 """Stiffness along an axis, over that of grains held to the uniform strain, below which a pack
 does not carry."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moduli:
+    """Elastic constants of an isotropic material, Pa.
+
+    Attributes:
+        bulk: K.
+        shear: G.
+    """
+
+    bulk: float
+    shear: float
+
+    @property
+    def young(self) -> float:
+        """9 K G / (3 K + G)."""
+        return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear)
+
+    @property
+    def poisson(self) -> float:
+        """(3 K - 2 G) / (6 K + 2 G)."""
+        return (3 * self.bulk - 2 * self.shear) / (6 * self.bulk + 2 * self.shear)
+
+
+def voigt_average(tensor: Array) -> Moduli:
+    """The isotropic material with the mean stiffness over all directions (Voigt; Hill 1952)."""
+    normal, sideways = np.trace(tensor[:3, :3]), tensor[0, 1] + tensor[0, 2] + tensor[1, 2]
+    bulk = float(normal + 2 * sideways) / 9
+    return Moduli(bulk, float(normal - sideways + 3 * np.trace(tensor[3:, 3:])) / 15)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -41,8 +58,6 @@ class Elastic:
     Attributes:
         tensor: (6, 6) stiffness, Pa, in the order xx, yy, zz, yz, xz, xy.
         affine: (6, 6) the same with all grains held to the uniform strain: an upper bound.
-        averaged: the mean over all directions (Voigt).
-        affine_averaged: the same of `affine`.
         density: of the dry pack, kg/m3.
         coordination: mean number of joints with other grains, of a grain that carries.
         grains: number of grains.
@@ -56,8 +71,6 @@ class Elastic:
 
     tensor: Array
     affine: Array
-    averaged: Moduli
-    affine_averaged: Moduli
     density: float
     coordination: float
     grains: int
@@ -70,14 +83,34 @@ class Elastic:
     __repr__ = one_line
 
     @property
+    def averaged(self) -> Moduli:
+        """The mean of the tensor over all directions."""
+        return voigt_average(self.tensor)
+
+    @property
+    def compliance(self) -> Array | None:
+        """The inverse (6, 6), 1/Pa, of the tensor; None where something yields freely."""
+        return None if np.linalg.cond(self.tensor) > 1e12 else np.linalg.inv(self.tensor)
+
+    @property
     def anisotropy(self) -> float | None:
-        """Universal index of anisotropy, 0 when isotropic; None where nothing resists a shear."""
-        return anisotropy_of(self.tensor)
+        """5 G_V / G_R + K_V / K_R - 6: 0 when isotropic (Ranganathan and Ostoja-Starzewski 2008).
+
+        V is the mean stiffness over all directions, R the mean compliance (Reuss). None where the
+        tensor has no inverse.
+        """
+        if (soft := self.compliance) is None:
+            return None
+        normal, sideways = np.trace(soft[:3, :3]), soft[0, 1] + soft[0, 2] + soft[1, 2]
+        bulk = 1 / float(normal + 2 * sideways)
+        shear = 15 / float(4 * normal - 4 * sideways + 3 * np.trace(soft[3:, 3:]))
+        return 5 * self.averaged.shear / shear + self.averaged.bulk / bulk - 6
 
     @property
     def young_along(self) -> tuple[float, ...] | None:
-        """Young's modulus, Pa, along x, y and z with free sides."""
-        return young_along(self.tensor)
+        """Young's modulus, Pa, along x, y and z with free sides: 1 / S_ii; None as above."""
+        soft = self.compliance
+        return None if soft is None else tuple(float(1 / value) for value in np.diag(soft)[:3])
 
     @property
     def waves(self) -> tuple[float, float]:
@@ -94,28 +127,23 @@ def elastic_of(
     periodic: tuple[bool, bool, bool],
     porosity: float = 0.0,
 ) -> Elastic:
-    """Elastic tensor of a pack of grains.
+    """Elastic tensor of a pack of `grains` alone; sides that are not `periodic` are walls.
 
-    Args:
-        grains: spheres; those of another kind must be taken out before.
-        material: contacts and bonds.
-        periodic: which sides are periodic; the others are walls.
-        porosity: of the pack, for its density.
-
-    Raises MechanicsError where the pack does not carry a load along every axis.
+    The `porosity` is for its density. Raises MechanicsError where the pack does not carry a load
+    along every axis.
     """
     joints, kept = carrying(grains, material, periodic)
     volume = float(np.prod(np.diff(grains.box, axis=1)))
     count, length = len(grains), float(grains.radius.mean()) if len(grains) else 1.0
-    contacts, pairs = contact_springs(joints, material), ~joints.at_wall
-    springs = contacts + bond_springs(joints, material)
-    maps = kinematics(joints, count, length=length)
-    pulled = springs.reshape(-1, 1) * maps.of_strain
+    contacts, pairs = springs.contact_springs(joints, material), ~joints.at_wall
+    stiff = contacts + springs.bond_springs(joints, material)
+    maps = springs.kinematics(joints, count, length=length)
+    pulled = stiff.reshape(-1, 1) * maps.of_strain
     affine = maps.of_strain.T @ pulled / volume
     moving, motion = np.repeat(kept, 6), np.zeros((6 * count, len(STRAINS)))
     if kept.any():
         live = maps.of_grains[:, np.flatnonzero(moving)]
-        solve, load = solver_of(stiffness_matrix(live, springs)), -(live.T @ pulled)
+        solve, load = springs.solver_of(springs.stiffness_matrix(live, stiff)), -(live.T @ pulled)
         motion[moving] = np.column_stack([solve(column) for column in load.T])
     tensor = affine + (pulled.T @ (maps.of_grains @ motion)) / volume
     tensor = 0.5 * (tensor + tensor.T)
@@ -132,8 +160,6 @@ def elastic_of(
     return Elastic(
         tensor=tensor,
         affine=affine,
-        averaged=voigt_average(tensor),
-        affine_averaged=voigt_average(affine),
         density=(1 - porosity) * material.density,
         coordination=2 * float(pairs.sum()) / max(1, int(kept.sum())),
         grains=count,
@@ -153,7 +179,7 @@ def carrying(
     Grains with fewer than two joints are taken out until none is left, and so are groups that
     touch neither walls nor the largest group.
     """
-    joints, count = find_joints(grains, periodic, gap=material.gap), len(grains)
+    joints, count = springs.find_joints(grains, periodic, gap=material.gap), len(grains)
     kept = np.ones(count, bool)
     while True:
         live = kept[joints.first] & (joints.at_wall | kept[joints.second])

@@ -1,35 +1,29 @@
 """The moduli of a pack as keys of mechanics.json."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
 from fdnet.case.case import Case
 from fdnet.errors import CaseError, Doubt
-from fdnet.mechanics.elastic import Elastic, elastic_of
+from fdnet.mechanics.elastic import Elastic, elastic_of, voigt_average
 from fdnet.mechanics.springs import Cement, PackMaterial, find_joints, mean_force
-from fdnet.mechanics.triaxial import Sheared, Triaxial, triaxial
-from fdnet.scales.contacts import (
-    overlap_under,
-    pair_elastic,
-    secant_stiffness,
-    series,
-    tangential_stiffness,
-)
+from fdnet.mechanics.triaxial import LoadStep, Sheared, Triaxial, triaxial
+from fdnet.scales import contacts
 from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Snapshot
 
 
 def elastic_numbers(result: Elastic) -> dict[str, Any]:
     """Moduli, velocities and counts in SI; the moduli are those of the isotropic average."""
-    along = result.young_along or (None, None, None)
+    along, mean = result.young_along or (None, None, None), result.averaged
     p_wave, s_wave = result.waves
     return {
-        "young_modulus_Pa": result.averaged.young,
-        "poisson_ratio": result.averaged.poisson,
-        "bulk_modulus_Pa": result.averaged.bulk,
-        "shear_modulus_Pa": result.averaged.shear,
+        "young_modulus_Pa": mean.young,
+        "poisson_ratio": mean.poisson,
+        "bulk_modulus_Pa": mean.bulk,
+        "shear_modulus_Pa": mean.shear,
         "p_wave_m_s": p_wave,
         "s_wave_m_s": s_wave,
         "density_kg_m3": result.density,
@@ -38,7 +32,7 @@ def elastic_numbers(result: Elastic) -> dict[str, Any]:
         "young_modulus_z_Pa": along[2],
         "tensor_Pa": result.tensor.tolist(),
         "anisotropy": result.anisotropy,
-        "affine_young_modulus_Pa": result.affine_averaged.young,
+        "affine_young_modulus_Pa": voigt_average(result.affine).young,
         "coordination": result.coordination,
         "grains": result.grains,
         "rattlers": result.rattlers,
@@ -132,6 +126,7 @@ def triaxial_test(
     confining_Pa: float,
     strain: float = 0.01,
     steps: int = 20,
+    follow: Callable[[LoadStep], None] = lambda row: None,
 ) -> Sheared:
     """Confine a pack and compress it along x, quasi-statically; all in SI units.
 
@@ -141,6 +136,7 @@ def triaxial_test(
         confining_Pa: stress on the sides, Pa.
         strain: axial strain at the end.
         steps: load steps to it.
+        follow: is called with each row as it comes.
 
     Returns:
         `rows` (stresses in Pa and strains, compression above 0, bonds broken), `peak`, `young` in
@@ -161,7 +157,8 @@ def triaxial_test(
     """
     pack = grains.grains()
     test = Triaxial(confining=confining_Pa, strain=strain, steps=steps)
-    return triaxial(pack, pack_material(case, pack, confining_Pa), test, periodic=case.periodic)
+    material = pack_material(case, pack, confining_Pa)
+    return triaxial(pack, material, test, periodic=case.periodic, follow=follow)
 
 
 def pack_material(case: Case, grains: Snapshot, pressure_Pa: float | None = None) -> PackMaterial:
@@ -173,8 +170,8 @@ def pack_material(case: Case, grains: Snapshot, pressure_Pa: float | None = None
     """
     one, bonds = case.grains, case.bonds
     if case.contact.model != "hertz":
-        normal = series(one.normal_stiffness_N_m, one.normal_stiffness_N_m)
-        shear = series(one.tangential_stiffness, one.tangential_stiffness)
+        normal = contacts.series(one.normal_stiffness_N_m, one.normal_stiffness_N_m)
+        shear = contacts.series(one.tangential_stiffness, one.tangential_stiffness)
     elif pressure_Pa is None:
         raise CaseError(
             "contact.model: 'hertz' contacts have no stiffness without a load; give "
@@ -183,20 +180,24 @@ def pack_material(case: Case, grains: Snapshot, pressure_Pa: float | None = None
     elif not np.any((joints := find_joints(grains, case.periodic)).branch):
         normal, shear = 1.0, 1.0
     else:
-        elastic, radius = pair_elastic(case, ("grain", "grain"), 1.0), 0.5 * one.mean_radius_m
+        elastic, radius = (
+            contacts.pair_elastic(case, ("grain", "grain"), 1.0),
+            0.5 * one.mean_radius_m,
+        )
         force = mean_force(grains, joints, pressure_Pa)
-        overlap = overlap_under(force, elastic.modulus, radius)
-        normal = 1.5 * secant_stiffness(elastic.modulus, radius, overlap)
-        shear = tangential_stiffness(elastic.shear, radius, overlap)
+        overlap = contacts.overlap_under(force, elastic.modulus, radius)
+        normal = 1.5 * contacts.secant_stiffness(elastic.modulus, radius, overlap)
+        shear = contacts.tangential_stiffness(elastic.shear, radius, overlap)
     cement = None
     if bonds is not None:
-        tensile, sheared = bonds.tensile_strength_Pa, bonds.shear_strength_Pa
+        strengths = bonds.tensile_strength_Pa, bonds.shear_strength_Pa
+        tensile, sheared = (np.inf if one is None else one for one in strengths)
         cement = Cement(
             radius_ratio=bonds.radius_ratio,
             normal=bonds.normal_stiffness_Pa_m,
             shear=bonds.shear_stiffness_Pa_m,
-            tensile_strength=np.inf if tensile is None else tensile,
-            shear_strength=np.inf if sheared is None else sheared,
+            tensile_strength=tensile,
+            shear_strength=sheared,
             gap_ratio=bonds.gap_ratio,
         )
     return PackMaterial(

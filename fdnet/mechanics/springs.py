@@ -11,7 +11,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from fdnet.errors import MechanicsError
 from fdnet.network.flow.solver import dissected, factored
 from fdnet.spheres.geometry import touching_pairs, wrapped
-from fdnet.spheres.snapshot import Array, Snapshot, one_line
+from fdnet.spheres.snapshot import Array, Snapshot
 
 WALL = -1
 """Stands for a wall in the place of a second grain."""
@@ -28,8 +28,8 @@ class Joints:
         second: (K,) index of the other grain, `WALL` for a wall.
         overlap: (K,) m; a negative one is a gap.
         normal: (K, 3) unit vector from the first grain to the second, or into the wall.
-        arm_first: (K, 3) m, from the centre of the first grain to the point of contact.
-        arm_second: (K, 3) m, from the centre of the second grain; zero for a wall.
+        arm_first, arm_second: (K, 3) m, from the centre of each grain to the point of contact; the
+            second is zero for a wall.
         radius: (K,) m, of the smaller of the two grains.
     """
 
@@ -40,8 +40,6 @@ class Joints:
     arm_first: Array
     arm_second: Array
     radius: Array
-
-    __repr__ = one_line
 
     def __len__(self) -> int:
         return len(self.first)
@@ -106,12 +104,8 @@ def find_joints(
                 radius=grains.radius[near],
             )
         )
-    return Joints(
-        **{
-            name: np.concatenate([getattr(one, name) for one in kinds])
-            for name in Joints.__slots__
-        }
-    )
+    names = Joints.__slots__
+    return Joints(**{k: np.concatenate([getattr(one, k) for one in kinds]) for k in names})
 
 
 def mean_force(grains: Snapshot, joints: Joints, pressure: float) -> float:
@@ -151,37 +145,26 @@ class Kinematics:
     frame: Array
     length: float
 
-    __repr__ = one_line
-
 
 def kinematics(joints: Joints, count: int, *, length: float) -> Kinematics:
     """The maps of the joints between `count` grains."""
-    frame = frames(joints.normal)
+    frame = _frames(joints.normal)
     kept, place = ~joints.at_wall, np.arange(6)
     grain = np.concatenate([joints.first, joints.second[kept]])
-    block = np.concatenate(
-        [
-            -_block(frame, joints.arm_first, length),
-            _block(frame, joints.arm_second, length)[kept],
-        ]
-    )
+    first, second = (_block(frame, arm, length) for arm in (joints.arm_first, joints.arm_second))
+    block = np.concatenate([-first, second[kept]])
     row = 6 * np.arange(len(joints))[:, None, None] + place[None, :, None]
     row = np.broadcast_to(np.concatenate([row, row[kept]]), block.shape)
     column = np.broadcast_to(6 * grain[:, None, None] + place, block.shape)
-    return Kinematics(
-        of_grains=sparse.csr_matrix(
-            (block.ravel(), (row.ravel(), column.ravel())), shape=(6 * len(joints), 6 * count)
-        ),
-        of_strain=_of_strain(frame, joints.branch),
-        frame=frame,
-        length=length,
-    )
+    entries, shape = (row.ravel(), column.ravel()), (6 * len(joints), 6 * count)
+    of_grains = sparse.csr_matrix((block.ravel(), entries), shape=shape)
+    of_strain = _of_strain(frame, joints.branch)
+    return Kinematics(of_grains=of_grains, of_strain=of_strain, frame=frame, length=length)
 
 
-def frames(normal: Array) -> Array:
+def _frames(normal: Array) -> Array:
     """(K, 3, 3) right-handed frames whose first rows are the unit vectors `normal` (K, 3)."""
-    least = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    first = np.cross(normal, least)
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal), axis=1)])
     first /= np.linalg.norm(first, axis=1)[:, None]
     return np.stack([normal, first, np.cross(normal, first)], axis=1)
 
@@ -209,67 +192,6 @@ def _of_strain(frame: Array, branch: Array) -> Array:
     result = np.zeros((len(branch), 6, 6))
     result[:, :3] = frame @ moved
     return result.reshape(-1, 6)
-
-
-# ------------------------------------------------------------------------------------------------
-# Engineering constants of a stiffness tensor (6, 6), in the order xx, yy, zz, yz, xz, xy.
-
-
-@dataclass(frozen=True, slots=True)
-class Moduli:
-    """Elastic constants of an isotropic material, Pa.
-
-    Attributes:
-        bulk: K.
-        shear: G.
-    """
-
-    bulk: float
-    shear: float
-
-    @property
-    def young(self) -> float:
-        """9 K G / (3 K + G)."""
-        return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear)
-
-    @property
-    def poisson(self) -> float:
-        """(3 K - 2 G) / (6 K + 2 G)."""
-        return (3 * self.bulk - 2 * self.shear) / (6 * self.bulk + 2 * self.shear)
-
-
-def voigt_average(tensor: Array) -> Moduli:
-    """The isotropic material with the mean stiffness over all directions (Voigt; Hill 1952)."""
-    normal, sideways = np.trace(tensor[:3, :3]), tensor[0, 1] + tensor[0, 2] + tensor[1, 2]
-    bulk = float(normal + 2 * sideways) / 9
-    return Moduli(bulk, float(normal - sideways + 3 * np.trace(tensor[3:, 3:])) / 15)
-
-
-def compliance(tensor: Array) -> Array | None:
-    """The inverse (6, 6), 1/Pa, of the tensor; None where something yields freely."""
-    return None if np.linalg.cond(tensor) > 1e12 else np.linalg.inv(tensor)
-
-
-def anisotropy_of(tensor: Array) -> float | None:
-    """5 G_V / G_R + K_V / K_R - 6: 0 when isotropic (Ranganathan and Ostoja-Starzewski 2008).
-
-    V is the mean stiffness over all directions, R the mean compliance (Reuss). None where the
-    tensor has no inverse.
-    """
-    soft = compliance(tensor)
-    if soft is None:
-        return None
-    normal, sideways = np.trace(soft[:3, :3]), soft[0, 1] + soft[0, 2] + soft[1, 2]
-    bulk = 1 / float(normal + 2 * sideways)
-    shear = 15 / float(4 * normal - 4 * sideways + 3 * np.trace(soft[3:, 3:]))
-    stiff = voigt_average(tensor)
-    return 5 * stiff.shear / shear + stiff.bulk / bulk - 6
-
-
-def young_along(tensor: Array) -> tuple[float, ...] | None:
-    """Young's modulus, Pa, of a test along x, y and z with free sides: 1 / S_ii; None as above."""
-    soft = compliance(tensor)
-    return None if soft is None else tuple(float(1 / value) for value in np.diag(soft)[:3])
 
 
 # ------------------------------------------------------------------------------------------------
@@ -356,9 +278,8 @@ def bond_springs(joints: Joints, material: PackMaterial) -> Array:
     radius = disc_radius(joints, material)
     area, bending, twist = np.pi * radius**2, np.pi * radius**4 / 4, np.pi * radius**4 / 2
     across, bend = cement.shear * area, cement.normal * bending
-    return np.column_stack(
-        [cement.normal * area, across, across, cement.shear * twist, bend, bend]
-    )
+    along, turn = cement.normal * area, cement.shear * twist
+    return np.column_stack([along, across, across, turn, bend, bend])
 
 
 def bond_stress(force: Array, radius: Array) -> tuple[Array, Array]:
@@ -369,10 +290,8 @@ def bond_stress(force: Array, radius: Array) -> tuple[Array, Array]:
     there is no bond.
     """
     there = radius > 0
-    area, bending, twist = (
-        np.where(there, moment, 1.0)
-        for moment in (np.pi * radius**2, np.pi * radius**4 / 4, np.pi * radius**4 / 2)
-    )
+    moments = np.pi * radius**2, np.pi * radius**4 / 4, np.pi * radius**4 / 2
+    area, bending, twist = (np.where(there, moment, 1.0) for moment in moments)
     bent = np.hypot(force[:, 4], force[:, 5])
     sheared = np.hypot(force[:, 1], force[:, 2])
     tension = force[:, 0] / area + bent * radius / bending
@@ -417,15 +336,14 @@ def direct_solver(matrix: sparse.csr_matrix) -> SolveLoad:
     Raises MechanicsError where the matrix cannot be factored.
     """
     blocks, count = matrix.tobsr((6, 6)), matrix.shape[0] // 6
-    links = sparse.csr_matrix(
-        (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr), shape=(count, count)
-    )
+    entries = np.ones(len(blocks.indices)), blocks.indices, blocks.indptr
+    links = sparse.csr_matrix(entries, shape=(count, count))
     try:
         return factored(matrix, (6 * dissected(links)[:, None] + np.arange(6)).ravel())
     except RuntimeError as error:
         raise MechanicsError(
-            f"stiffness of {count} grains cannot be factored ({error}); raise the "
-            "stiffness of the contacts or add bonds"
+            f"stiffness of {count} grains cannot be factored ({error}); raise the stiffness of "
+            "the contacts or add bonds"
         ) from error
 
 
@@ -445,13 +363,8 @@ def iterative_solver(matrix: sparse.csr_matrix) -> SolveLoad:
         return np.einsum("nij,nj->ni", inverse, missing.reshape(-1, 6)).ravel()
 
     def solve(load: Array) -> Array:
-        moved, left = cg(
-            matrix,
-            load,
-            rtol=WITHIN,
-            maxiter=MOST_STEPS,
-            M=LinearOperator(matrix.shape, better, dtype=float),
-        )
+        inner = LinearOperator(matrix.shape, better, dtype=float)
+        moved, left = cg(matrix, load, rtol=WITHIN, maxiter=MOST_STEPS, M=inner)
         if left:
             raise MechanicsError(
                 f"solve of {len(load) // 6} grains: the residual is not {WITHIN:g} of the load "

@@ -8,19 +8,8 @@ import numpy as np
 from scipy import sparse
 
 from fdnet.errors import CaseError, MechanicsError
-from fdnet.mechanics.springs import (
-    CONTACT_GAP,
-    Joints,
-    Kinematics,
-    PackMaterial,
-    bond_springs,
-    bond_stress,
-    direct_solver,
-    disc_radius,
-    find_joints,
-    kinematics,
-    mean_force,
-)
+from fdnet.mechanics import springs
+from fdnet.mechanics.springs import CONTACT_GAP, Joints, Kinematics, PackMaterial
 from fdnet.spheres.snapshot import Array, Snapshot, one_line, resting
 
 SOUND, TENSION, SHEAR = 0, 1, 2
@@ -66,8 +55,6 @@ class Deformed:
     memory: Memory
     strain: Array
 
-    __repr__ = one_line
-
 
 def at_rest(
     grains: Snapshot, material: PackMaterial, periodic: tuple[bool, bool, bool], *, relieved: bool
@@ -77,7 +64,7 @@ def at_rest(
     `relieved` takes the overlaps as the state without stress; otherwise they are compressed
     springs. Bonds hold no force yet.
     """
-    joints = find_joints(grains, periodic, gap=material.gap)
+    joints = springs.find_joints(grains, periodic, gap=material.gap)
     key, count = keys_of(joints, len(grains)), len(joints)
     order = np.argsort(key)
     touches = joints.overlap > -2 * CONTACT_GAP * joints.radius
@@ -144,8 +131,6 @@ class LoadedPack:
     limit: Array
     volume: float
 
-    __repr__ = one_line
-
     def moves(self, motion: Array, strain: Array) -> Array:
         """Displacements (K, 6) in the joints by a motion (6 N,) and a strain (3,)."""
         given = self.maps.of_grains @ motion + self.maps.of_strain[:, :3] @ strain
@@ -172,11 +157,8 @@ class JointForces:
     bond: Array
     sliding: Array
 
-    __repr__ = one_line
 
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Load:
+class Load(NamedTuple):
     """What is asked of one step.
 
     Attributes:
@@ -191,8 +173,6 @@ class Load:
     drag: float
     within: float
 
-    __repr__ = one_line
-
 
 def loaded_pack(
     pack: Deformed, material: PackMaterial, periodic: tuple[bool, bool, bool]
@@ -201,8 +181,8 @@ def loaded_pack(
 
     Forces across the normal are turned with it, at their size.
     """
-    joints = find_joints(pack.grains, periodic, gap=max(REACH, material.gap))
-    maps = kinematics(joints, len(pack.grains), length=float(pack.grains.radius.mean()))
+    joints = springs.find_joints(pack.grains, periodic, gap=max(REACH, material.gap))
+    maps = springs.kinematics(joints, len(pack.grains), length=float(pack.grains.radius.mean()))
     key, kept = keys_of(joints, len(pack.grains)), pack.memory
     place = np.minimum(np.searchsorted(pack.key, key), max(0, len(pack.key) - 1))
     known = pack.key[place] == key if len(pack.key) else np.zeros(len(key), bool)
@@ -219,10 +199,7 @@ def loaded_pack(
     )
     whole, overlap = memory.whole[:, None], joints.overlap - memory.rest
     friction = np.where(joints.at_wall, material.wall_friction, material.friction)
-    force, moment = (
-        np.einsum("kij,kj->ki", maps.frame, one)
-        for one in (memory.bond[:, :3], memory.bond[:, 3:])
-    )
+    bond = np.einsum("kij,klj->kli", maps.frame, memory.bond.reshape(-1, 2, 3)).reshape(-1, 6)
     return LoadedPack(
         pack=pack,
         material=material,
@@ -231,8 +208,8 @@ def loaded_pack(
         memory=memory,
         overlap=overlap,
         held=np.einsum("kij,kj->ki", maps.frame, memory.shear)[:, 1:],
-        bond=np.where(whole, np.concatenate([force, moment], axis=1), 0.0),
-        springs=np.where(whole, bond_springs(joints, material), 0.0),
+        bond=np.where(whole, bond, 0.0),
+        springs=np.where(whole, springs.bond_springs(joints, material), 0.0),
         limit=friction * material.normal * np.maximum(overlap, 0.0),
         volume=float(np.prod(np.diff(pack.grains.box, axis=1))),
     )
@@ -316,13 +293,13 @@ def _newton(
     """Change of the motion (6 N,) and of the `free` (F,) strains by the tangent stiffness."""
     of_grains, across = loaded.maps.of_grains, loaded.maps.of_strain[:, :3][:, free]
     joints, count = np.arange(len(forces.tangent)), of_grains.shape[1]
-    springs = sparse.bsr_matrix((forces.tangent, joints, np.arange(len(joints) + 1))).tocsr()
-    matrix = (of_grains.T @ springs @ of_grains).tocsr()
-    solve = direct_solver(matrix + load.drag * sparse.identity(count, format="csr"))
+    stiff = sparse.bsr_matrix((forces.tangent, joints, np.arange(len(joints) + 1))).tocsr()
+    matrix = (of_grains.T @ stiff @ of_grains).tocsr()
+    solve = springs.direct_solver(matrix + load.drag * sparse.identity(count, format="csr"))
     moved_by = solve(missing[:count])
     if not len(free):
         return moved_by, np.empty(0)
-    pulled = springs @ across
+    pulled = stiff @ across
     coupling = of_grains.T @ pulled
     reply = np.column_stack([solve(column) for column in coupling.T])
     own, square = across.T @ pulled - coupling.T @ reply, loaded.maps.length**2
@@ -339,13 +316,9 @@ def carried_out(loaded: LoadedPack, motion: Array, strain: Array) -> tuple[Defor
     """
     forces = forces_at(loaded, loaded.moves(motion, strain))
     pack, frame = loaded.pack, loaded.maps.frame
-    force, moment = (
-        np.einsum("kji,kj->ki", frame, one) for one in (forces.bond[:, :3], forces.bond[:, 3:])
-    )
-    memory = loaded.memory._replace(
-        shear=np.einsum("kji,kj->ki", frame[:, 1:], forces.shear),
-        bond=np.concatenate([force, moment], axis=1),
-    )
+    bond = np.einsum("kji,klj->kli", frame, forces.bond.reshape(-1, 2, 3)).reshape(-1, 6)
+    shear = np.einsum("kji,kj->ki", frame[:, 1:], forces.shear)
+    memory = loaded.memory._replace(shear=shear, bond=bond)
     grains, shift = pack.grains, motion.reshape(-1, 6)[:, :3]
     low = grains.box[:, :1]
     box = low + (grains.box - low) * (1 + strain)[:, None]
@@ -372,7 +345,9 @@ def overloaded(loaded: LoadedPack, forces: JointForces) -> tuple[Array, Array]:
     cement = loaded.material.cement
     if cement is None:
         return np.zeros(len(loaded.joints)), np.full(len(loaded.joints), SOUND)
-    tension, shear = bond_stress(forces.bond, disc_radius(loaded.joints, loaded.material))
+    tension, shear = springs.bond_stress(
+        forces.bond, springs.disc_radius(loaded.joints, loaded.material)
+    )
     pulled = tension / cement.tensile_strength
     cut = shear / cement.shear_strength
     ratio = np.where(loaded.memory.whole, np.maximum(pulled, cut), 0.0)
@@ -386,10 +361,11 @@ def overloaded(loaded: LoadedPack, forces: JointForces) -> tuple[Array, Array]:
 # beyond their strength break, those nearest to it first, and it is brought to rest again.
 
 
-MOST_DRAG = 1e-1
-"""Drag of the first step at each load, over the stiffness of a contact.
-
-It falls to `Triaxial.drag` as the steps get easy."""
+MOST_DRAG, LEAST_DRAG = 1e-1, 1e-4
+"""Drag on the motion of grains relative to the strain, over the stiffness of a contact: at the
+first step of each load, and what it falls to as the steps get easy."""
+MOST_RESTS = 60
+"""Most steps at one load before the pack counts as restless."""
 _GROUP = 0.8
 """Bonds break together whose stress over strength is above this share of the largest."""
 MOST_OVERLAP = 0.05
@@ -410,21 +386,14 @@ class Triaxial:
         steps: load steps to that strain.
         tolerance: largest unbalanced force over the mean force of a contact, and the largest
             change of the axial stress between two steps at rest, over the stress.
-        drag: on the motion of grains relative to the strain, over the stiffness of a contact.
-        rests: most steps at one load before the pack counts as restless.
         relieved: whether the overlaps of the pack are its state without stress.
-        sides: whether the stress is held on the sides (a triaxial test); otherwise they do not
-            move (an oedometer).
     """
 
     confining: float
     strain: float = 0.02
     steps: int = 40
     tolerance: float = 1e-2
-    drag: float = 1e-4
-    rests: int = 60
     relieved: bool = True
-    sides: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -484,15 +453,13 @@ class Sheared:
     @property
     def young(self) -> float:
         """Slope of the first load step, Pa."""
-        first, second = self.rows[0], self.rows[1]
-        return (second.deviatoric - first.deviatoric) / (second.axial_strain - first.axial_strain)
+        start, first = self.rows[:2]
+        return (first.deviatoric - start.deviatoric) / first.axial_strain
 
     @property
     def poisson(self) -> float:
         """Sideways over axial strain of the first load step."""
-        first, second = self.rows[0], self.rows[1]
-        axial = second.axial_strain - first.axial_strain
-        return 0.5 * (1 - (second.volume_strain - first.volume_strain) / axial)
+        return 0.5 * (1 - self.rows[1].volume_strain / self.rows[1].axial_strain)
 
     @property
     def peak(self) -> LoadStep:
@@ -518,30 +485,18 @@ def triaxial(
     material = replace(material, glued=False)
     pack, row, restless = confined(grains, material, test, periodic)
     pack = replace(pack, strain=np.zeros(3))
-    rows = [_since(row, pack)]
+    rows = [replace(row, axial_strain=0.0, volume_strain=0.0)]
     follow(rows[0])
-    sides, step = np.nan if test.sides else 0.0, 1 / test.steps
+    step, stress = 1 / test.steps, np.full(3, -test.confining)
     # the first step is divided, for the initial slope
     for share in (PROBE * step, (1 - PROBE) * step, *[step] * (test.steps - 1)):
-        strain = np.array([-share * test.strain, sides, sides])
-        stress = np.full(3, -test.confining)
+        strain = np.array([-share * test.strain, np.nan, np.nan])
         pack, row, calm = _brought_to_rest(pack, material, test, periodic, strain, stress)
         restless += not calm
-        rows.append(_since(row, pack))
-        follow(rows[-1])
-    return Sheared(
-        test=test,
-        rows=tuple(rows),
-        pack=pack,
-        bonds=int(pack.memory.bonded.sum()),
-        restless=restless,
-    )
-
-
-def _since(row: LoadStep, pack: Deformed) -> LoadStep:
-    return replace(
-        row, axial_strain=-float(pack.strain[0]), volume_strain=-float(pack.strain.sum())
-    )
+        rows.append(row)
+        follow(row)
+    bonds = int(pack.memory.bonded.sum())
+    return Sheared(test=test, rows=tuple(rows), pack=pack, bonds=bonds, restless=restless)
 
 
 def confined(
@@ -551,14 +506,14 @@ def confined(
 
     Raises what `triaxial` raises.
     """
-    joints = find_joints(grains, periodic, gap=material.gap)
+    joints = springs.find_joints(grains, periodic, gap=material.gap)
     if len(joints) == 0:
         raise MechanicsError(
             f"pack of {len(grains)} grains has no contacts; make it denser, or bridge its gaps "
             "with bonds.gap_ratio"
         )
     stress, diameter = test.confining, 2 * float(grains.radius.mean())
-    overlap = mean_force(grains, joints, stress) / material.normal / diameter
+    overlap = springs.mean_force(grains, joints, stress) / material.normal / diameter
     if overlap > MOST_OVERLAP:
         raise CaseError(
             f"--confining-MPa: {stress / 1e6:g} presses grains {100 * overlap:.3g} % of a "
@@ -569,10 +524,8 @@ def confined(
     pack = at_rest(grains, material, periodic, relieved=test.relieved)
     restless, parts = 0, CONFINING_STEPS if test.relieved else 1
     for part in range(1, parts + 1):
-        held = np.full(3, -stress * part / parts)
-        pack, row, calm = _brought_to_rest(
-            pack, material, test, periodic, np.full(3, np.nan), held
-        )
+        held, free = np.full(3, -stress * part / parts), np.full(3, np.nan)
+        pack, row, calm = _brought_to_rest(pack, material, test, periodic, free, held)
         restless += not calm
     if row.contacts == 0 or not row.axial > 0.5 * stress:
         raise MechanicsError(
@@ -580,15 +533,6 @@ def confined(
             f"{row.axial:.3g} Pa along x; take a denser pack"
         )
     return pack, row, restless
-
-
-def _falls_apart(pack: Deformed, test: Triaxial) -> MechanicsError:
-    """What is said of a pack that has no contact left, or whose box has no volume left."""
-    return MechanicsError(
-        f"pack of {len(pack.grains)} grains falls apart under {test.confining:.3g} Pa: its "
-        "contacts open before they bear the stress; take a denser pack, a lower --confining-MPa, "
-        "or bonds"
-    )
 
 
 def _brought_to_rest(
@@ -606,14 +550,16 @@ def _brought_to_rest(
     """
     drag, before = MOST_DRAG, np.inf
     within = 0.1 * test.tolerance * test.confining * 4 * float(pack.grains.radius.mean()) ** 2
-    for rests in range(1, test.rests + 1):
+    for rests in range(1, MOST_RESTS + 1):
         loaded = loaded_pack(pack, material, periodic)
         load = Load(strain=strain, stress=stress, drag=drag * material.normal, within=within)
-        if len(loaded.joints) == 0:
-            raise _falls_apart(pack, test)
         motion, given, taken = balance(loaded, load)
-        if not np.all(given > -1.0):
-            raise _falls_apart(pack, test)
+        if len(loaded.joints) == 0 or not np.all(given > -1.0):
+            raise MechanicsError(
+                f"pack of {len(pack.grains)} grains falls apart under {test.confining:.3g} Pa: "
+                "its contacts open before they bear the stress; take a denser pack, a lower "
+                "--confining-MPa, or bonds"
+            )
         strain = np.where(np.isnan(strain), np.nan, 0.0)
         pack, forces = carried_out(loaded, motion, given)
         # the bonds that are farthest beyond their strength break
@@ -627,7 +573,7 @@ def _brought_to_rest(
             pack = replace(pack, memory=pack.memory._replace(broken=broken, bond=bond))
         row = _row_of(pack, loaded, forces, rests)
         easier = 0.25 if taken < NEWTON_STEPS // 2 else 1.0 if taken < NEWTON_STEPS else 4.0
-        drag = min(max(drag * easier, test.drag), MOST_DRAG)
+        drag = min(max(drag * easier, LEAST_DRAG), MOST_DRAG)
         change = abs(row.axial - before) / max(abs(row.axial), 1e-300)
         before = row.axial
         if worst <= 1 and row.unbalanced <= test.tolerance and change <= test.tolerance:
@@ -641,8 +587,8 @@ def _row_of(pack: Deformed, loaded: LoadedPack, forces: JointForces, rests: int)
     pairs = (forces.normal > 0) & ~loaded.joints.at_wall
     mean = float(forces.normal[pairs].mean()) if pairs.any() else 1e-300
     return LoadStep(
-        axial_strain=0.0,
-        volume_strain=0.0,
+        axial_strain=-float(pack.strain[0]),
+        volume_strain=-float(pack.strain.sum()),
         axial=-float(total[0]),
         side=-float(total[1:].mean()),
         tension=int(np.sum(pack.memory.broken == TENSION)),

@@ -2,7 +2,6 @@
 
 import shlex
 import time
-from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,15 +10,7 @@ from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case, recorded_case, set_keys
 from fdnet.errors import CaseError, explained
 from fdnet.files import write_text
-from fdnet.mechanics.of_case import (
-    elastic_moduli,
-    elastic_numbers,
-    pack_material,
-    triaxial_numbers,
-    triaxial_warnings,
-    warnings_of,
-)
-from fdnet.mechanics.triaxial import LoadStep, Triaxial, triaxial
+from fdnet.mechanics import of_case
 from fdnet.report.html import put_mechanics
 from fdnet.report.tables import plain_json, write_rows
 from fdnet.run.dem_stages import packed_grains
@@ -56,10 +47,10 @@ def packed_case(source: Path, options: RunOptions, assignments: list[str]) -> Pa
             raise CaseError(f"{folder}: holds no fdnet run; give a case file or a run folder")
         case = case_from(set_keys(recorded_case(file).data(), assignments), source=str(file))
         if read_record(folder, "pack") is None:
+            words = f"{shlex.quote(str(file))} --out {shlex.quote(str(folder))}"
             raise CaseError(
-                f"{folder}: holds no finished pack; run the stage pack first (fdnet run "
-                f"{shlex.quote(str(file))} --out {shlex.quote(str(folder))} --stages pack "
-                "--resume)"
+                f"{folder}: holds no finished pack; run the stage pack first (fdnet run {words} "
+                "--stages pack --resume)"
             )
     else:
         case = read_case(source, assignments=assignments)
@@ -75,51 +66,45 @@ def packed_case(source: Path, options: RunOptions, assignments: list[str]) -> Pa
             f"{folder}: its pack belongs to another case; give another --out, or leave out --set "
             "of keys that change the pack"
         )
-    return Packed(case=case, grains=packed_grains(folder, case), folder=folder)
+    return Packed(case, packed_grains(folder, case), folder)
 
 
 def measure_elastic(packed: Packed, pressure_Pa: float | None) -> dict[str, Any]:
     """Elastic moduli of the pack as keys of mechanics.json, with warnings and seconds."""
     start, case = time.monotonic(), packed.case
-    result = elastic_moduli(packed.grains, case, pressure_Pa=pressure_Pa)
+    result = of_case.elastic_moduli(packed.grains, case, pressure_Pa=pressure_Pa)
     data = case.data()
     springs = {f"grains.{key}": data["grains"][key] for key in _SPRINGS if key in data["grains"]}
     return {
         "case": case.name,
         "seed": case.seed,
-        **elastic_numbers(result),
+        **of_case.elastic_numbers(result),
         "springs": springs | {f"bonds.{key}": one for key, one in data.get("bonds", {}).items()},
-        "warnings": [explained(one) for one in warnings_of(result, case)],
+        "warnings": [explained(one) for one in of_case.warnings_of(result, case)],
         "seconds": time.monotonic() - start,
     }
 
 
-def measure_triaxial(
-    packed: Packed, test: Triaxial, follow: Callable[[LoadStep], None]
-) -> dict[str, Any]:
-    """A triaxial test of the pack, as its numbers with warnings and seconds.
+def measure_triaxial(packed: Packed, **test: Any) -> dict[str, Any]:
+    """A `triaxial_test` of the pack, as its numbers with warnings and seconds.
 
     Writes stress_strain.csv and its figure to the folder of the mechanics.
     """
     from fdnet.report.figures import draw_stress_strain
 
-    start, case = time.monotonic(), packed.case
-    material = pack_material(case, packed.grains, test.confining)
-    result = triaxial(packed.grains, material, test, periodic=case.periodic, follow=follow)
-    numbers = triaxial_numbers(result)
-    numbers["warnings"] = [explained(one) for one in triaxial_warnings(result)]
+    start = time.monotonic()
+    result = of_case.triaxial_test(packed.grains, packed.case, **test)
+    numbers = of_case.triaxial_numbers(result)
+    numbers["warnings"] = [explained(one) for one in of_case.triaxial_warnings(result)]
     numbers["seconds"] = time.monotonic() - start
     folder = packed.folder / FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     rows = [asdict(row) for row in result.rows]
-    write_rows(folder / CURVE, {_COLUMNS.get(k, k): [row[k] for row in rows] for k in rows[0]})
+    own = {"axial": "axial_Pa", "side": "side_Pa"}
+    own |= {"tension": "broken_in_tension", "shear": "broken_in_shear"}
+    write_rows(folder / CURVE, {own.get(k, k): [row[k] for row in rows] for k in rows[0]})
     draw_stress_strain(result.rows, folder / "stress_strain.png", bonds=result.bonds)
     return numbers
-
-
-_COLUMNS = {"axial": "axial_Pa", "side": "side_Pa", "tension": "broken_in_tension"} | {
-    "shear": "broken_in_shear"
-}
 
 
 def write_mechanics(packed: Packed, numbers: dict[str, Any]) -> Path:

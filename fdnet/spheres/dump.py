@@ -1,7 +1,4 @@
-"""Dumps of LIGGGHTS and LAMMPS.
-
-Text dumps of LIGGGHTS and LAMMPS: the one parser, and the columns fdnet writes.
-"""
+"""Dumps of LIGGGHTS and LAMMPS in text, and of LIGGGHTS in binary; the columns fdnet writes."""
 
 import io
 import re
@@ -35,14 +32,12 @@ class Frame:
         box: (3, 2) bounds of the simulation box.
         columns: names of the C columns.
         rows: (N, C) values, sorted by the column id where there is one.
-        units: name of the units that the dump gives ("si", "lj"), empty where it gives none.
     """
 
     step: int
     box: Array
     columns: tuple[str, ...]
     rows: Array
-    units: str = ""
 
     __repr__ = one_line
 
@@ -99,12 +94,13 @@ def parse_dump(data: bytes, source: str) -> Iterator[Frame]:
         yield reader.frame(head, range(len(head.columns)))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Head:
     """What stands before the rows of a frame, and where they stand.
 
     Attributes:
-        step, box, columns, units: as those of a `Frame`.
+        step, box, columns: as those of a `Frame`.
+        units: name of the units that the dump gives ("si", "lj"), empty where it gives none.
         boundary: what the file says of the sides across x, y and z ("pp", "ff"), else empty.
         count: number of rows.
         body: where the rows stand in the bytes.
@@ -165,21 +161,18 @@ class DumpReader:
         return text
 
     def item(self, expected: bytes) -> bytes:
-        line = self.line
-        if self.position >= len(self.data):
-            raise self.fail(f"the file ends before {expected.decode()}", line - 1, cut=True)
-        text = self.take()
+        line, text = self.line, self.value(expected.decode())
         if not text.startswith(expected):
             raise self.fail(f"{_shown(text)}, expected {expected.decode()!r}", line)
         return text[len(expected) :]
 
     def value(self, what: str) -> bytes:
         if self.position >= len(self.data):
-            raise self.fail(f"the file ends before the {what}", self.line - 1, cut=True)
+            raise self.fail(f"the file ends before {what}", self.line - 1, cut=True)
         return self.take()
 
     def whole(self, what: str) -> int:
-        line, text = self.line, self.value(what)
+        line, text = self.line, self.value(f"the {what}")
         if not (text.isdigit() and len(text) < 19):
             raise self.fail(f"{what} is {_shown(text)}, expected a whole number, 0 or more", line)
         return int(text)
@@ -189,7 +182,7 @@ class DumpReader:
         self.step = -1
         self.goes_on()
         while self.data.startswith(_OPTIONAL, self.position):
-            name, text = self.take(), self.value("value of an item")
+            name, text = self.take(), self.value("the value of an item")
             self.units = text.decode("ascii", "replace") if name == _OPTIONAL[0] else self.units
         self.item(_ITEMS[0])
         self.step = self.whole("step")
@@ -209,24 +202,14 @@ class DumpReader:
             raise self.fail("ITEM: ATOMS names no columns", self.line - 1)
         end = self.data.find(b"ITEM: ", self.position)
         end = len(self.data) if end < 0 else end
-        head = Head(
-            step=self.step,
-            box=box,
-            columns=columns,
-            units=self.units,
-            boundary=boundary,
-            count=count,
-            body=slice(self.position, end),
-            line=self.line,
-        )
-        body = self.data[head.body]
-        lines = body.count(b"\n")
-        self.refuse_cut(head, body, lines, last=end == len(self.data))
-        self.position, self.line = end, self.line + lines
+        rows = slice(self.position, end)
+        head = Head(self.step, box, columns, self.units, boundary, count, rows, self.line)
+        self.refuse_cut(head, self.data[rows], last=end == len(self.data))
+        self.position, self.line = end, self.line + self.data[rows].count(b"\n")
         return head
 
     def bounds(self, numbers: int) -> list[float]:
-        line, text = self.line, self.value("bounds of the box")
+        line, text = self.line, self.value("the bounds of the box")
         try:
             low, high, *tilt = (float(part) for part in text.split())
         except ValueError:
@@ -239,19 +222,16 @@ class DumpReader:
                 line,
             )
         if any(tilt):
-            raise self.fail(
-                f"the box is slanted (triclinic) by {tilt[0]:g}, expected sides along the axes",
-                line,
-            )
+            slant = f"the box is slanted (triclinic) by {tilt[0]:g}"
+            raise self.fail(f"{slant}, expected sides along the axes", line)
         return [low, high]
 
-    def refuse_cut(self, head: Head, body: bytes, lines: int, *, last: bool) -> None:
+    def refuse_cut(self, head: Head, body: bytes, *, last: bool) -> None:
         """Raise DumpError unless all rows of the frame are there and whole."""
-        ended = body.endswith(b"\n") or not body
-        rows = lines + (not ended)
+        whole = ended = body.endswith(b"\n") or not body
+        rows = body.count(b"\n") + (not ended)
         if rows != head.count:
             rows = sum(1 for row in body.split(b"\n") if row.strip())
-        whole = ended
         if last and not ended and not self.own:
             end = body[body.rfind(b"\n") + 1 :].split()
             whole = not end or len(end) >= len(head.columns)
@@ -275,13 +255,8 @@ class DumpReader:
             table = self.careful(head, body, needed)
         if "id" in names:
             table = table[np.argsort(table[:, names.index("id")], kind="stable")]
-        return Frame(
-            step=head.step,
-            box=frozen(head.box, float),
-            columns=names,
-            rows=frozen(table),
-            units=head.units,
-        )
+        box = frozen(head.box, float)
+        return Frame(step=head.step, box=box, columns=names, rows=frozen(table))
 
     def careful(self, head: Head, body: bytes, needed: Sequence[int]) -> Array:
         """The rows as numbers, one by one; names the first that is bad."""
@@ -291,18 +266,13 @@ class DumpReader:
             if not parts:
                 continue
             if len(parts) != len(head.columns):
-                names = " ".join(head.columns)
-                raise self.fail(
-                    f"{len(parts)} values, expected {len(head.columns)} ({names})", line
-                )
+                expected = f"expected {len(head.columns)} ({' '.join(head.columns)})"
+                raise self.fail(f"{len(parts)} values, {expected}", line)
             rows.append([_number(parts[index]) for index in needed])
             for index, value in zip(needed, rows[-1], strict=True):
                 if not np.isfinite(value):
-                    raise self.fail(
-                        f"column {head.columns[index]} holds {_shown(parts[index])}, expected a "
-                        "finite number",
-                        line,
-                    )
+                    what = f"column {head.columns[index]} holds {_shown(parts[index])}"
+                    raise self.fail(f"{what}, expected a finite number", line)
         return np.array(rows)
 
 
@@ -338,17 +308,8 @@ def _table(head: Head, body: bytes, needed: Sequence[int]) -> Array | None:
 # The file does not name its columns, so the caller gives them.
 
 
-_HEADER = np.dtype(
-    [
-        ("step", "<i8"),
-        ("count", "<i8"),
-        ("slanted", "<i4"),
-        ("boundary", "<i4", (6,)),
-        ("box", "<f8", (3, 2)),
-        ("columns", "<i4"),
-        ("blocks", "<i4"),
-    ]
-)
+_HEADER = np.dtype("<i8, <i8, <i4, (6,)<i4, (3,2)<f8, <i4, <i4")
+_HEADER.names = ("step", "count", "slanted", "boundary", "box", "columns", "blocks")
 """`DumpCustom::header_binary` of LIGGGHTS 3.8; a block for each rank follows, with its number of
 values (int) before them."""
 
@@ -360,43 +321,34 @@ def read_binary_frame(path: Path, columns: tuple[str, ...]) -> Frame:
     holds other columns, a slanted box, or a number that is not finite.
     """
     with full_disk_named(path.parent):
-        return _frame(bytes_of(path), columns, str(path))
-
-
-def _frame(data: bytes, columns: tuple[str, ...], source: str) -> Frame:
-    if len(data) < _HEADER.itemsize:
-        raise DumpError(f"{source}: the file ends in its header. {CUT}")
-    header = np.frombuffer(data, _HEADER, count=1)[0]
-    step, width = int(header["step"]), int(header["columns"])
-    if header["slanted"] or width != len(columns) or header["count"] < 0:
-        raise DumpError(
-            f"{source}: step {step}: {width} columns of {header['count']} atoms, slanted box "
-            f"{header['slanted']}; expected {len(columns)} columns ({' '.join(columns)}) "
-            "and slanted box 0, which has its sides along the axes"
-        )
-    values = _values(data, int(header["blocks"]), f"{source}: step {step}")
-    if len(values) != header["count"] * width:
-        raise DumpError(
-            f"{source}: step {step}: {len(values)} values, expected {width} for each of "
-            f"{header['count']} atoms. {CUT}"
-        )
-    if not np.all(np.isfinite(values)):
-        raise DumpError(f"{source}: step {step}: a value is not finite, expected numbers")
+        data = bytes_of(path)
+        if len(data) < _HEADER.itemsize:
+            raise DumpError(f"{path}: the file ends in its header. {CUT}")
+        header = np.frombuffer(data, _HEADER, count=1)[0]
+        step, width, where = int(header["step"]), len(columns), f"{path}: step {header['step']}"
+        if header["slanted"] or header["columns"] != width or header["count"] < 0:
+            raise DumpError(
+                f"{where}: {header['columns']} columns of {header['count']} atoms, slanted box "
+                f"{header['slanted']}; expected {width} columns ({' '.join(columns)}) and slanted "
+                "box 0, which has its sides along the axes"
+            )
+        parts, at = [np.empty(0)], _HEADER.itemsize
+        for _ in range(header["blocks"]):
+            count, at = int.from_bytes(data[at : at + 4], "little", signed=True), at + 4
+            if count < 0 or at + 8 * count > len(data):
+                raise DumpError(f"{where}: the file ends in a block of {count} values. {CUT}")
+            parts.append(np.frombuffer(data, "<f8", count=count, offset=at))
+            at += 8 * count
+        values = np.concatenate(parts)
+        if at != len(data):
+            raise DumpError(f"{where}: {len(data) - at} bytes follow the frame, expected 0. {CUT}")
+        if len(values) != header["count"] * width:
+            raise DumpError(
+                f"{where}: {len(values)} values, expected {width} for each of {header['count']} "
+                f"atoms. {CUT}"
+            )
+        if not np.all(np.isfinite(values)):
+            raise DumpError(f"{where}: a value is not finite, expected numbers")
     rows = values.reshape(-1, width)
-    order = np.argsort(rows[:, columns.index("id")], kind="stable")
-    return Frame(step=step, box=frozen(header["box"]), columns=columns, rows=frozen(rows[order]))
-
-
-def _values(data: bytes, blocks: int, source: str) -> Array:
-    """All values of the blocks, in their order."""
-    parts, at = [np.empty(0)], _HEADER.itemsize
-    for _ in range(blocks):
-        count = int.from_bytes(data[at : at + 4], "little", signed=True)
-        end = at + 4 + 8 * count
-        if count < 0 or at + 4 > len(data) or end > len(data):
-            raise DumpError(f"{source}: the file ends in a block of {count} values. {CUT}")
-        parts.append(np.frombuffer(data, "<f8", count=count, offset=at + 4))
-        at = end
-    if at != len(data):
-        raise DumpError(f"{source}: {len(data) - at} bytes follow the frame, expected none. {CUT}")
-    return np.concatenate(parts)
+    rows = frozen(rows[np.argsort(rows[:, columns.index("id")], kind="stable")])
+    return Frame(step=step, box=frozen(header["box"]), columns=columns, rows=rows)

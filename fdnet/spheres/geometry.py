@@ -1,7 +1,4 @@
-"""Spheres in a box: contacts, images across periodic sides, porosity.
-
-Which spheres touch, by how much they overlap, and which lie inside others.
-"""
+"""Spheres in a box: contacts, which lie inside others, images beyond its sides, porosity."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -33,10 +30,9 @@ def touching_pairs(
     if len(radius) == 0:
         return np.empty((0, 2), int), np.empty(0)
     period = np.where(periodic, spheres.box[:, 1] - spheres.box[:, 0], 0.0)
-    position = spheres.position - spheres.box[:, 0]
-    position = np.where(period > 0, np.mod(position, np.where(period > 0, period, 1.0)), position)
-    # rounding may leave a wrapped place at the period itself, which the search tree refuses
-    position = np.where((period > 0) & (position >= period), 0.0, position)
+    place = spheres.position - spheres.box[:, 0]
+    place = np.where(period > 0, np.mod(place, np.where(period > 0, period, 1.0)), place)
+    position = in_period(place, period)
     small = radius <= 0.5 * radius.max()
     groups = [group for group in (np.flatnonzero(small), np.flatnonzero(~small)) if len(group)]
     trees = [cKDTree(position[group], boxsize=period) for group in groups]
@@ -45,9 +41,8 @@ def touching_pairs(
         for i in range(len(groups))
         for j in range(i, len(groups))
     ]
-    return np.concatenate([pairs for pairs, _ in touching]), np.concatenate(
-        [overlap for _, overlap in touching]
-    )
+    pairs, overlap = (np.concatenate(part) for part in zip(*touching, strict=True))
+    return pairs, overlap
 
 
 def _pairs(
@@ -174,8 +169,6 @@ class Images:
     shift: Array
     mirror: Array
 
-    __repr__ = one_line
-
 
 def wrapped(position: Array, box: Array, periodic: tuple[bool, ...]) -> Array:
     """Positions (N, 3) brought into [low, high) along the periodic axes."""
@@ -183,14 +176,19 @@ def wrapped(position: Array, box: Array, periodic: tuple[bool, ...]) -> Array:
     return np.where(periodic, low + (position - low) % size, position)
 
 
+def in_period(place: Array, period: Array) -> Array:
+    """Wrapped places (N, 3) in [0, period); rounding may have left some at the period itself.
+
+    The period is 0 where there is none. Search trees refuse a place that is not below it.
+    """
+    return np.where((period > 0) & (place >= period), 0.0, place)
+
+
 def neighbour_tree(position: Array, box: Array, *, periodic: tuple[bool, ...]) -> cKDTree:
     """Search tree of `position` (N, 3) that sees across the periodic sides."""
-    low, size = box[:, 0], box[:, 1] - box[:, 0]
-    place = wrapped(position, box, periodic) - low
-    # rounding may leave a wrapped place at the size itself
-    return cKDTree(
-        np.where(periodic & (place >= size), 0.0, place), boxsize=np.where(periodic, size, 0.0)
-    )
+    period = np.where(periodic, box[:, 1] - box[:, 0], 0.0)
+    place = wrapped(position, box, periodic) - box[:, 0]
+    return cKDTree(in_period(place, period), boxsize=period)
 
 
 def repeated(spheres: Snapshot, times: tuple[int, int, int]) -> Snapshot:
@@ -216,40 +214,39 @@ def make_images(
     A margin of NaN makes no images along that axis. A centre within `tolerance` m of a
     non-periodic face, or beyond it, gets no mirror image there.
     """
-    count = len(position)
-    owner, shift, mirror = (
-        np.arange(count),
-        np.zeros((count, 3), np.int16),
-        np.zeros((count, 3), np.int8),
-    )
+    owner = np.arange(len(position))
+    shift, mirror = np.zeros(position.shape, np.int16), np.zeros(position.shape, np.int8)
     position = wrapped(position, box, periodic)
     for axis in range(3):
         if np.isnan(margin[axis]):
             continue
-        make = _shifted if periodic[axis] else _mirrored
-        pick, place, steps, codes = make(
-            position[:, axis], box[axis], float(margin[axis]), tolerance
-        )
+        x, reach = position[:, axis], float(margin[axis])
+        if periodic[axis]:
+            pick, place, steps = _shifted(x, box[axis], reach)
+            codes = np.zeros(len(pick), int)
+        else:
+            pick, place, codes = _mirrored(x, box[axis], reach, tolerance)
+            steps = np.zeros(len(pick), int)
         owner, position, shift, mirror = owner[pick], position[pick], shift[pick], mirror[pick]
         position[:, axis], shift[:, axis], mirror[:, axis] = place, steps, codes
     return Images(owner=owner, position=position, shift=shift, mirror=mirror)
 
 
-def _shifted(
-    x: Array, bounds: Array, margin: float, tolerance: float
-) -> tuple[Array, Array, Array, Array]:
+def _shifted(x: Array, bounds: Array, margin: float) -> tuple[Array, Array, Array]:
+    """Which centres the images of one axis have, their places, and their numbers of periods."""
     low, high = bounds
     reach = int(np.ceil(margin / (high - low)))
     steps = np.repeat(np.arange(-reach, reach + 1), len(x))
     pick = np.tile(np.arange(len(x)), 2 * reach + 1)
     place = x[pick] + steps * (high - low)
     near = (place >= low - margin) & (place < high + margin)
-    return pick[near], place[near], steps[near], np.zeros(near.sum(), int)
+    return pick[near], place[near], steps[near]
 
 
 def _mirrored(
     x: Array, bounds: Array, margin: float, tolerance: float
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array]:
+    """Which centres the images of one axis have, their places, and the codes of the mirrors."""
     low, high = bounds
     own = np.where((x <= low + tolerance) | (x >= high - tolerance), ON_FACE, INSIDE)
     # a centre on one face has an image as far beyond the other when the margin is the whole side
@@ -257,10 +254,8 @@ def _mirrored(
     upper = np.flatnonzero((x < high - tolerance) & (x > high - margin - tolerance))
     pick = np.concatenate([np.arange(len(x)), lower, upper])
     place = np.concatenate([x, 2 * low - x[lower], 2 * high - x[upper]])
-    codes = np.concatenate(
-        [own, np.full(len(lower), MIRROR_LOW), np.full(len(upper), MIRROR_HIGH)]
-    )
-    return pick, place, np.zeros(len(pick), int), codes
+    beyond = np.repeat([MIRROR_LOW, MIRROR_HIGH], [len(lower), len(upper)])
+    return pick, place, np.concatenate([own, beyond])
 
 
 def label(images: Images) -> Array:
@@ -297,11 +292,10 @@ class Porosity:
 
     Attributes:
         mean: porosity with the overlap of spheres counted once.
-        standard_error: standard error of `mean`.
+        standard_error: of `mean`.
         edges: (B+1,) edges of the bins of depth, m.
         profile: (B,) porosity of each bin, overlap counted once.
-        sum: porosity from the plain sum, 1 - volumes of the spheres centred in the box / its
-            volume.
+        sum: 1 - volumes of the spheres centred in the box / its volume.
     """
 
     mean: float
@@ -331,18 +325,21 @@ def measure_porosity(
     low, high = spheres.box.T
     bins = np.array(spheres.box[0] if edges is None else edges, dtype=float)
     cuts = np.unique(np.concatenate([[low[0], high[0]], bins]))
-    shifts = _spread_shifts(np.random.default_rng(SHIFT_SEED))
-    filled = np.array(
-        [_filled_below(spheres, cuts, shift, lines, tuple(periodic)) for shift in shifts]
-    )
+    rng = np.random.default_rng(SHIFT_SEED)
+    strata = np.stack([rng.permutation(LATTICES), rng.permutation(LATTICES)], axis=1)
+    shifts = (strata + rng.random((LATTICES, 2))) / LATTICES
+    filled = np.array([_filled_below(spheres, cuts, one, lines, periodic) for one in shifts])
     void = 1.0 - (filled[:, -1] - filled[:, 0]) / (high[0] - low[0])
     at_bins = filled.mean(axis=0)[np.searchsorted(cuts, bins)]
+    centred = (spheres.position >= low) & (spheres.position < high)
+    within = np.all(centred | np.array(periodic), axis=1)
+    volume = 4.0 / 3.0 * np.pi * np.sum(spheres.radius[within] ** 3)
     return Porosity(
         mean=float(_without_rounding(void.mean())),
         standard_error=float(void.std(ddof=1) / np.sqrt(LATTICES)),
         edges=frozen(bins),
         profile=frozen(_without_rounding(1.0 - np.diff(at_bins) / np.diff(bins))),
-        sum=_plain_sum(spheres, periodic),
+        sum=float(1.0 - volume / np.prod(high - low)),
     )
 
 
@@ -352,36 +349,26 @@ def _without_rounding(value: Array) -> Array:
     return np.where(np.abs(value - bounded) < ROUNDING, bounded, value)
 
 
-def _spread_shifts(rng: np.random.Generator) -> Array:
-    strata = np.stack([rng.permutation(LATTICES), rng.permutation(LATTICES)], axis=1)
-    return (strata + rng.random((LATTICES, 2))) / LATTICES
-
-
-def _plain_sum(spheres: Snapshot, periodic: Sequence[bool]) -> float:
-    low, high = spheres.box.T
-    within = np.all(
-        ((spheres.position >= low) & (spheres.position < high)) | np.array(periodic), axis=1
-    )
-    volume = 4.0 / 3.0 * np.pi * np.sum(spheres.radius[within] ** 3)
-    return float(1.0 - volume / np.prod(high - low))
-
-
 def _filled_below(
-    spheres: Snapshot, cuts: Array, shift: Array, lines: int, periodic: tuple[bool, ...]
+    spheres: Snapshot, cuts: Array, shift: Array, lines: int, periodic: Sequence[bool]
 ) -> Array:
     """Mean solid length of a line from the first to each of `cuts` (C,), on one lattice."""
     size = spheres.box[1:, 1] - spheres.box[1:, 0]
     count = np.maximum(1, np.round(np.sqrt(lines * size / size[::-1]))).astype(int)
     sphere, line, half = _crossings(spheres, count, shift, periodic)
-    start, end = _wrapped(spheres, sphere, half, periodic[0])
-    line = np.resize(line, len(start))
-    start, end = np.clip(start, cuts[0], cuts[-1]), np.clip(end, cuts[0], cuts[-1])
+    centre, images = spheres.position[sphere, 0], np.zeros(1)
+    if periodic[0]:
+        low, length = spheres.box[0, 0], spheres.box[0, 1] - spheres.box[0, 0]
+        centre, images = low + (centre - low) % length, np.array([0.0, -length, length])
+    centre = (centre + images[:, None]).ravel()
+    half, line = np.tile(half, len(images)), np.tile(line, len(images))
+    start, end = (np.clip(one, cuts[0], cuts[-1]) for one in (centre - half, centre + half))
     start, end = _disjoint(line, start, end, cuts[-1] - cuts[0])
     return (_total_below(start, cuts) - _total_below(end, cuts)) / count.prod()
 
 
 def _crossings(
-    spheres: Snapshot, count: Array, shift: Array, periodic: tuple[bool, ...]
+    spheres: Snapshot, count: Array, shift: Array, periodic: Sequence[bool]
 ) -> tuple[Array, Array, Array]:
     """Sphere index, line index and half chord length of every line through a sphere."""
     step = (spheres.box[1:, 1] - spheres.box[1:, 0]) / count
@@ -401,20 +388,6 @@ def _crossings(
     inside = square > 0
     cell = cell[inside] % count
     return sphere[inside], cell[:, 0] * count[1] + cell[:, 1], np.sqrt(square[inside])
-
-
-def _wrapped(
-    spheres: Snapshot, sphere: Array, half: Array, periodic_x: bool
-) -> tuple[Array, Array]:
-    """Chord ends (K,); with a periodic x their two images are appended."""
-    centre = spheres.position[sphere, 0]
-    length = spheres.box[0, 1] - spheres.box[0, 0]
-    if periodic_x:
-        centre = spheres.box[0, 0] + (centre - spheres.box[0, 0]) % length
-    images = (0.0, -length, length) if periodic_x else (0.0,)
-    centre = np.concatenate([centre + image for image in images])
-    half = np.tile(half, len(images))
-    return centre - half, centre + half
 
 
 def _disjoint(line: Array, start: Array, end: Array, span: float) -> tuple[Array, Array]:

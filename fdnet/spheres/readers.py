@@ -1,16 +1,12 @@
-"""Spheres from files: CSV, dumps and VTK.
-
-Sphere tables: written at full precision, read back strictly.
-"""
+"""Spheres from files: tables in text, dumps and VTK."""
 
 import csv
 import io
 import math
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -18,28 +14,19 @@ import numpy as np
 
 from fdnet.errors import CaseError, DumpError
 from fdnet.files import LARGE, MARKS, expanded, file_bytes, replacing, text_of, unzipped
+from fdnet.spheres import snapshot
 from fdnet.spheres.dump import DumpReader, Head
 from fdnet.spheres.rows import Columns, SphereRows, columns_of, rows_from, scale_of
-from fdnet.spheres.snapshot import (
-    KIND_NAMES,
-    UNITS,
-    Array,
-    Directions,
-    Kind,
-    Snapshot,
-    checked_box,
-    grain_box,
-    metres_per,
-    periodic_axes,
-)
+from fdnet.spheres.snapshot import KIND_NAMES, UNITS, Array, Directions, Kind, Snapshot
 
 PLAIN = ("x", "y", "z", "radius")
-METRES = ("x_m", "y_m", "z_m", "radius_m")
+OWN_TYPES = {int(kind): name for name, kind in KIND_NAMES.items()}
+"""Atom types of fdnet's own dumps: 1 a grain, 2 a fine."""
 _BEFORE_UNIT = re.compile(r"\s*([(\[])\s*")
 _FRACTION = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
-def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
+def write_spheres(path: str | Path, spheres: Snapshot) -> Path:
     """Write x_m, y_m, z_m, radius_m, kind, id; one row per sphere, atomically.
 
     Coordinates are the shortest decimals that read back to the same number (`repr`), so that a
@@ -47,11 +34,10 @@ def write_spheres(path: str | Path, snapshot: Snapshot) -> Path:
     """
     import pandas as pd
 
-    names = {int(kind): name for name, kind in KIND_NAMES.items()}
-    columns = dict(zip(METRES, (*snapshot.position.T, snapshot.radius), strict=True))
-    frame = pd.DataFrame(
-        columns | {"kind": [names[int(k)] for k in snapshot.kind], "id": snapshot.id}
-    )
+    lengths = zip(PLAIN, (*spheres.position.T, spheres.radius), strict=True)
+    frame = pd.DataFrame({f"{name}_m": values for name, values in lengths})
+    kinds = [OWN_TYPES[kind] for kind in spheres.kind.tolist()]
+    frame = frame.assign(kind=kinds, id=spheres.id)
     with replacing(path) as part:
         frame.to_csv(part, index=False, lineterminator="\n")
     return Path(path)
@@ -68,130 +54,96 @@ def table_rows(data: bytes, source: str, *, units: str | None = None) -> SphereR
     Blank lines and lines that start with `#` are skipped. Raises CaseError that names the file,
     the line, what it holds and what was expected.
     """
-    lines = _Lines(text_of(data, source), source)
-    cells = lines.cells()
-    try:
-        first = next(cells, None)
-        if first is None:
-            raise CaseError(f"{source}: the file is empty; expected a header {','.join(PLAIN)}")
-        names, notes = _names(first, lines)
-        columns = columns_of(names, lines.where())
-        scale = scale_of(columns, units, lines.where())
-        if scale is None:
-            raise CaseError(
-                f"{lines.where()}: the columns {','.join(PLAIN)} have no unit; give --units mm "
-                f'on the command line, units="mm" in Python (one of {", ".join(UNITS)}), or name '
-                "them x_m,y_m,z_m,radius_m"
-            )
-        rows = cells if first is names else chain([first], cells)
-        table, numbers = [], []
-        for row in rows:
-            if len(row) != len(names):
-                raise CaseError(
-                    f"{lines.where()}: {len(row)} values, expected {len(names)} as in the header"
-                )
-            table.append([_value(row[k], columns, k, lines) for k in columns.needed])
-            numbers.append(lines.number)
-    except csv.Error as error:
-        raise CaseError(f"{lines.where()}: {error}; expected comma-separated values") from error
-    if not table:
+    lines: list[tuple[int, str]] = []
+    comment = ""
+    for number, line in enumerate(io.StringIO(text_of(data, source), newline=None), start=1):
+        if line.lstrip().startswith("#"):
+            comment = comment if lines else line.strip().lstrip("#").strip()
+        elif line.strip():
+            lines.append((number, line))
+    if not lines:
+        raise CaseError(f"{source}: the file is empty; expected a header {','.join(PLAIN)}")
+    mark = next((mark for mark in ";\t," if mark in lines[0][1]), "\t")
+    where, comma = f"{source}:{lines[0][0]}", mark == ","
+    first = _cells(lines[0][1], mark, where)
+    titled = any(_float(cell, comma=comma) is None for cell in first)
+    names, rows = first if titled else _names(first, comment, where), lines[titled:]
+    columns = columns_of(names, where)
+    scale = scale_of(columns, units, where)
+    if scale is None:
+        raise CaseError(
+            f"{where}: the columns {','.join(PLAIN)} have no unit; give --units mm on the command "
+            f'line, units="mm" in Python (one of {", ".join(UNITS)}), or name them '
+            "x_m,y_m,z_m,radius_m"
+        )
+    if not rows:
         raise CaseError(f"{source}: no spheres after the header; expected at least one row")
+    table = []
+    for number, line in rows:
+        cells, where = _cells(line, mark, f"{source}:{number}"), f"{source}:{number}"
+        if len(cells) != len(names):
+            raise CaseError(
+                f"{where}: {len(cells)} values, expected {len(names)} as in the header"
+            )
+        table.append([_value(cells[k], columns, k, where, comma=comma) for k in columns.needed])
+    notes = []
+    if names is PLAIN:
+        notes.append(f"{source} has no header: its four columns are x, y, z and radius.")
     if columns.ignored:
         notes.append(f"Columns of {source} that are not read: {', '.join(columns.ignored)}.")
     return rows_from(
         columns,
         dict(zip(columns.needed, np.array(table).T, strict=True)),
-        lambda row: f"{source}:{numbers[row]}",
+        lambda row: f"{source}:{rows[row][0]}",
         scale=scale,
         source=source,
         notes=tuple(notes),
     )
 
 
-class _Lines:
-    """The lines of a text that carry data, counting all of them from 1."""
-
-    def __init__(self, text: str, source: str) -> None:
-        self.text, self.source, self.number = text, source, 0
-        self.comment = ""
-        self.comma = False
-
-    def where(self) -> str:
-        return f"{self.source}:{self.number}" if self.number else self.source
-
-    def cells(self) -> Iterator[list[str]]:
-        """The cells of each line, parted as the first of them is.
-
-        Where that is not by commas, a comma is that of a decimal fraction.
-        """
-        lines = self._lines()
-        first = next(lines, None)
-        if first is None:
-            return
-        marks = [mark for mark in (";", "\t", ",") if mark in first]
-        self.comma = marks[:1] == [","]
-        whole = chain([first], lines)
-        if marks and marks[0] != "\t":
-            yield from csv.reader(whole, delimiter=marks[0], strict=True)
-        else:
-            for line in whole:
-                yield [cell.strip('"') for cell in _BEFORE_UNIT.sub(r"\1", line).split()]
-
-    def _lines(self) -> Iterator[str]:
-        started = False
-        for line in io.StringIO(self.text, newline=None):
-            self.number += 1
-            if line.lstrip().startswith("#"):
-                self.comment = self.comment if started else line.strip().lstrip("#").strip()
-            elif line.strip():
-                started = True
-                yield line
+def _cells(line: str, mark: str, where: str) -> list[str]:
+    """The cells of a line between marks; a tab stands for any blank space."""
+    if mark == "\t":
+        return [cell.strip('"') for cell in _BEFORE_UNIT.sub(r"\1", line).split()]
+    try:
+        return next(csv.reader([line], delimiter=mark, strict=True))
+    except csv.Error as error:
+        raise CaseError(f"{where}: {error}; expected comma-separated values") from error
 
 
-def _names(first: list[str], lines: _Lines) -> tuple[list[str], list[str]]:
-    """Names of the columns, and what was assumed of them.
-
-    They are the `first` line itself unless it holds numbers alone; then those of the comment
-    before it, or x, y, z, radius. Raises CaseError where there are none.
-    """
-    if any(_float(cell, comma=lines.comma) is None for cell in first):
-        return first, []
-    words = re.split(r"[\s,;]+", lines.comment)
+def _names(first: list[str], comment: str, where: str) -> Sequence[str]:
+    """Names of the columns under a `first` line of numbers: those of the comment, or PLAIN."""
+    words = re.split(r"[\s,;]+", comment)
     if len(words) == 2 and words[0].lower() == "format":
         words = words[1].split("_")
         words += ["further"] * (len(first) - len(words))
     if len(words) == len(first) and not all(_float(word, comma=False) for word in words):
-        return words, []
-    if len(first) != len(PLAIN) or "diam" in lines.comment.lower():
+        return words
+    if len(first) != len(PLAIN) or "diam" in comment.lower():
         raise CaseError(
-            f"{lines.where()}: no header above {len(first)} columns of numbers; expected a line "
-            f"of names, {','.join(PLAIN)} or {','.join(PLAIN[:3])},diameter"
+            f"{where}: no header above {len(first)} columns of numbers; expected a line of names, "
+            f"{','.join(PLAIN)} or {','.join(PLAIN[:3])},diameter"
         )
-    note = f"{lines.source} has no header: its four columns are x, y, z and radius."
-    return list(PLAIN), [note]
+    return PLAIN
 
 
-def _value(cell: str, columns: Columns, index: int, lines: _Lines) -> float:
-    name = columns.names[index].strip()
-    text = cell.strip()
+def _value(cell: str, columns: Columns, index: int, where: str, *, comma: bool) -> float:
+    name, text = columns.names[index].strip(), cell.strip()
     if index == columns.others.get("kind"):
         kind = KIND_NAMES.get(text.lower()) or {str(int(k)): k for k in Kind}.get(text)
         if kind is None:
-            raise CaseError(
-                f"{lines.where()}: {name} is {text[:40]!r}, expected {' or '.join(KIND_NAMES)}"
-            )
+            expected = " or ".join(KIND_NAMES)
+            raise CaseError(f"{where}: {name} is {text[:40]!r}, expected {expected}")
         return float(kind)
-    value = _float(text, comma=lines.comma)
+    value = _float(text, comma=comma)
     if value is None or not math.isfinite(value):
         expected = "a whole number" if index in columns.others.values() else "a finite number"
-        raise CaseError(
-            f"{lines.where()}: {name} is {text[:40]!r}, expected {expected} (decimal point)"
-        )
+        raise CaseError(f"{where}: {name} is {text[:40]!r}, expected {expected} (decimal point)")
     return value
 
 
 def _float(text: str, *, comma: bool) -> float | None:
-    """The number of a cell; None where it is none. `comma` parts cells, else fractions."""
+    """The number of a cell; None where it is none. A `comma` parts cells, else fractions."""
     plain = text.strip()
     if not comma and _FRACTION.fullmatch(plain):
         plain = plain.replace(",", ".")
@@ -225,16 +177,19 @@ def dump_spheres(
     heads, cut = _heads(reader)
     head = _chosen(heads, cut, source, step)
     where = f"{source}: step {head.step}"
-    scale = _scale(head, where) if units is None else metres_per(units)
-    columns = columns_of(head.columns, where, box=True, units=False)
+    if units is None and head.units and head.units not in DUMP_UNITS:
+        raise CaseError(
+            f"{where}: its units are {head.units!r}, which fdnet cannot convert to m; give the "
+            "unit of length of the file (units)"
+        )
+    scale = DUMP_UNITS.get(head.units, 1.0) if units is None else snapshot.metres_per(units)
+    columns = columns_of(head.columns, where, dump=True)
     frame = reader.frame(head, columns.needed)
     notes = [f"The lengths of {source} are in m."] if units is None and not head.units else []
     if len(heads) > 1 and step is None:
         notes.append(f"The last of {len(heads)} frames of {source} was used, step {head.step}.")
-    warnings = [
-        f"{text}; this frame was left out and that of step {head.step} used" for text in cut
-    ]
-    warnings = warnings if step is None else []
+    left = f"; this frame was left out and that of step {head.step} used"
+    warnings = [f"{error}{left}" for error in cut] if step is None else []
     end = data[head.body][-_MOST_SHOWN:]
     if end and not end[-1:].isspace():
         last = end.split()[-1].decode("utf-8", "replace")
@@ -253,7 +208,7 @@ def dump_spheres(
     )
 
 
-def _heads(reader: DumpReader) -> tuple[list[Head], list[str]]:
+def _heads(reader: DumpReader) -> tuple[list[Head], list[DumpError]]:
     """The whole frames, and of each frame that is cut what is wrong with it.
 
     Raises DumpError where all are cut.
@@ -270,10 +225,10 @@ def _heads(reader: DumpReader) -> tuple[list[Head], list[str]]:
             reader.to_next(before)
     if cut and not heads:
         raise cut[0]
-    return heads, [str(error) for error in cut]
+    return heads, cut
 
 
-def _chosen(heads: list[Head], cut: list[str], source: str, step: int | None) -> Head:
+def _chosen(heads: list[Head], cut: list[DumpError], source: str, step: int | None) -> Head:
     chosen = heads if step is None else [head for head in heads if head.step == step]
     if not chosen:
         known = ", ".join(str(head.step) for head in heads[:_MOST_NAMED])
@@ -285,21 +240,9 @@ def _chosen(heads: list[Head], cut: list[str], source: str, step: int | None) ->
     return chosen[-1]
 
 
-def _scale(head: Head, where: str) -> float:
-    if head.units and head.units not in DUMP_UNITS:
-        raise CaseError(
-            f"{where}: its units are {head.units!r}, which fdnet cannot convert to m; give the "
-            "unit of length of the file (units)"
-        )
-    return DUMP_UNITS.get(head.units, 1.0)
-
-
 # ------------------------------------------------------------------------------------------------
 # Spheres from a file of any known format, with grains distinguished from fines.
 
-
-OWN_TYPES = {int(kind): name for name, kind in KIND_NAMES.items()}
-"""Atom types of fdnet's own dumps: 1 a grain, 2 a fine."""
 
 _START = 1000
 """Bytes at the start of a file that tell its format."""
@@ -402,14 +345,14 @@ def read_sphere_file(
     """
     rows = _read_rows(path, units, step)
     kind, notes = _kinds(rows, fines_below, types)
-    bounds = rows.box if box is None else rows.scale * checked_box(box)
+    bounds = rows.box if box is None else rows.scale * snapshot.checked_box(box)
     around = bounds is None
     if bounds is None:
-        bounds = grain_box(rows.position, rows.radius, kind)
+        bounds = snapshot.grain_box(rows.position, rows.radius, kind)
         notes = [*notes, "The specimen is the box around all grains."]
     elif box is None:
         notes = [*notes, f"The specimen is the box of {rows.source}."]
-    around_it, side_notes, side_warnings = _sides(rows, bounds, periodic)
+    sides, side_notes, side_warnings = _sides(rows, bounds, periodic)
     count = len(rows.radius)
     spheres = Snapshot(
         step=rows.step,
@@ -420,7 +363,7 @@ def read_sphere_file(
         position=rows.position,
         radius=rows.radius,
         velocity=np.zeros((count, 3)),
-        periodic=around_it,
+        periodic=sides,
     )
     return SphereFile(
         spheres=spheres,
@@ -434,25 +377,24 @@ def _sides(
     rows: SphereRows, box: Array, given: Directions | None
 ) -> tuple[tuple[bool, bool, bool] | None, list[str], list[str]]:
     """Which sides repeat, what was assumed of them, and where the file contradicts that."""
+    chosen = None if given is None else snapshot.periodic_axes(given)
     if not rows.boundary or rows.box is None:
-        return (None if given is None else periodic_axes(given)), [], []
-    said: list[bool] = [flag == "pp" for flag in rows.boundary]
-    near = np.isclose(box, rows.box, rtol=_SAME_BOX, atol=_SAME_BOX * np.ptp(rows.box))
-    same: list[bool] = list(np.all(near, axis=1).tolist())
-    own = " ".join(rows.boundary)
-    if given is not None:
-        chosen = periodic_axes(given)
-        other = [axis for axis, a, b in zip("xyz", chosen, said, strict=True) if a and not b]
+        return chosen, [], []
+    said, own = np.array(rows.boundary) == "pp", " ".join(rows.boundary)
+    if chosen is not None:
+        other = [axis for axis, wrong in zip("xyz", chosen & ~said, strict=True) if wrong]
         text = (
             f"{rows.source} says BOX BOUNDS {own}, so that {', '.join(other)} has walls, but "
             "periodic sides are given there; spheres stay a radius away from walls, and such a "
             "pack taken as periodic has gaps and too high a permeability"
         )
         return chosen, [], [text] if other else []
-    x, y, z = (a and b for a, b in zip(said, same, strict=True))
-    names = ["periodic" if one else "walls" for one in (x, y, z)]
-    text = ", ".join(f"{axis} {name}" for axis, name in zip("xyz", names, strict=True))
-    cut = [axis for axis, a, b in zip("xyz", said, same, strict=True) if a and not b]
+    near = np.isclose(box, rows.box, rtol=_SAME_BOX, atol=_SAME_BOX * np.ptp(rows.box))
+    same = np.all(near, axis=1)
+    x, y, z = (said & same).tolist()
+    names = zip("xyz", (x, y, z), strict=True)
+    text = ", ".join(f"{axis} {'periodic' if one else 'walls'}" for axis, one in names)
+    cut = [axis for axis, lost in zip("xyz", said & ~same, strict=True) if lost]
     why = f", but the box given is another across {', '.join(cut)}" if cut else ""
     note = f"The sides of the box are those of {rows.source} (BOX BOUNDS {own}{why}): {text}."
     return (x, y, z), [note], []
@@ -487,18 +429,17 @@ def _kinds(
 
     Raises CaseError on choices that contradict each other.
     """
-    count = len(rows.radius)
     if fines_below is not None:
         return _by_radius(rows, fines_below, types), []
     if types is not None:
         return _by_type(rows, types), []
     if rows.kind is not None:
         return rows.kind, []
-    if rows.type is None:
-        note = f"{rows.source} does not tell grains from fines: all its spheres are grains."
-        return np.full(count, Kind.GRAIN), [note]
-    note = f"In {rows.source} type 1 is a grain and type 2 a fine."
-    return _by_type(rows, OWN_TYPES), [note]
+    if rows.type is not None:
+        note = f"In {rows.source} type 1 is a grain and type 2 a fine."
+        return _by_type(rows, OWN_TYPES), [note]
+    note = f"{rows.source} does not tell grains from fines: all its spheres are grains."
+    return np.full(len(rows.radius), Kind.GRAIN), [note]
 
 
 def _by_radius(rows: SphereRows, limit: float, types: Mapping[int, str] | None) -> Array:
@@ -508,9 +449,7 @@ def _by_radius(rows: SphereRows, limit: float, types: Mapping[int, str] | None) 
             f"fines_below: {limit:g} and {other} both tell grains from fines; give one of the two"
         )
     if not (np.isfinite(limit) and limit > 0):
-        raise CaseError(
-            f"fines_below: {limit:g}, expected a radius above 0 in the unit of the file"
-        )
+        raise CaseError(f"fines_below: {limit:g}, expected a radius above 0, in the file's unit")
     kind = np.where(rows.radius < rows.scale * limit, Kind.FINE, Kind.GRAIN)
     if not np.any(kind == Kind.GRAIN):
         largest = rows.radius.max() / rows.scale
@@ -526,9 +465,7 @@ def _by_type(rows: SphereRows, types: Mapping[int, str]) -> Array:
     if unknown:
         raise CaseError(f"types: {unknown[0]!r}, expected grain or fine for each type")
     if rows.type is None:
-        raise CaseError(
-            f"{rows.source}: has no types; name kinds in a column, or give fines_below"
-        )
+        raise CaseError(f"{rows.source}: has no types; give a column of kinds, or fines_below")
     present, which = np.unique(rows.type, return_inverse=True)
     missing = sorted(set(present.tolist()) - set(types))
     if missing:

@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 
 from fdnet.errors import CaseError
-from fdnet.spheres.snapshot import (
-    KIND_NAMES,
-    UNITS,
-    Array,
-    Kind,
-    frozen,
-    metres_per,
-    one_line,
-)
+from fdnet.spheres.snapshot import KIND_NAMES, UNITS, Array, Kind, frozen, metres_per
 
 PLACES = tuple(tuple(f"{axis}{end}" for axis in "xyz") for end in ("", "u", "s", "su"))
 PLACES += (("points:0", "points:1", "points:2"),)
@@ -43,14 +35,11 @@ class SphereRows:
         scale: metres in the unit of the file.
         position: (N, 3) centres, m.
         radius: (N,) m.
-        kind: (N,) int64 of `Kind` where the file names kinds, else None.
-        type: (N,) int64 atom types where the file has them, else None.
-        id: (N,) int64 numbers where the file has them, else None.
+        kind, type, id: (N,) int64 of `Kind`, atom types and numbers, where the file has them.
         box: (3, 2) bounds that the file gives, m, else None.
         boundary: what the file says of the sides across x, y and z ("pp", "ff"), else empty.
         step: time step of the simulation, 0 without one.
-        notes: what the reader assumed, one sentence each.
-        warnings: what of the file could not be read, one sentence each.
+        notes, warnings: what the reader assumed, and could not read, one sentence each.
     """
 
     source: str
@@ -65,8 +54,6 @@ class SphereRows:
     step: int = 0
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
-
-    __repr__ = one_line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,24 +87,22 @@ class Columns:
         return tuple(name for k, name in enumerate(self.names) if k not in self.needed)
 
 
-def columns_of(
-    names: Sequence[str], where: str, *, box: bool = False, units: bool = True
-) -> Columns:
+def columns_of(names: Sequence[str], where: str, *, dump: bool = False) -> Columns:
     """The columns of a file by their names, in which capitals do not matter.
 
-    Without a `box` there are no centres in parts of it. With `units`, a name may end in the unit
+    Those of a `dump` may be centres in parts of its box, those of other files may end in the unit
     of length ("x_mm", "radius (um)"). Raises CaseError where a centre or a size is missing, a
     column that is needed occurs twice, or units differ.
     """
     known: dict[str, list[int]] = {}
     unit_of: dict[int, str | None] = {}
     for index, name in enumerate(names):
-        plain, unit = named(name) if units else (name.strip().lower(), None)
+        plain, unit = (name.strip().lower(), None) if dump else named(name)
         known.setdefault(plain, []).append(index)
         unit_of[index] = unit
     given = [one for one in PLACES if all(name in known for name in one)]
     radii = [name for name in RADII if name in known]
-    sought = [name for name in given if box or name not in SCALED]
+    sought = [name for name in given if dump or name not in SCALED]
     shown = ",".join(names)[:200]
     if not sought or not radii:
         wanted = [name for name in "xyz" if name not in known] if not sought else []
@@ -127,7 +112,7 @@ def columns_of(
         raise CaseError(
             f"{where}: no column {', '.join(lacking)} among {shown!r}{hint}; expected x,y,z and "
             "radius or diameter, and, if there, kind, type and id"
-            + ("" if box else " (or the same with their unit, x_mm)")
+            + ("" if dump else " (or the same with their unit, x_mm)")
         )
     for name in (*sought[0], *radii, *OTHERS):
         if len(known.get(name, ())) > 1:
@@ -162,10 +147,9 @@ def scale_of(columns: Columns, units: str | None, where: str) -> float | None:
 
     Raises CaseError on an unknown unit, and where both say it.
     """
-    if units is not None:
-        metres_per(units)
+    given = None if units is None else metres_per(units)
     if columns.unit is None:
-        return None if units is None else UNITS[units]
+        return given
     if units not in (None, columns.unit):
         name = columns.names[next(iter(columns.radius))].strip()
         raise CaseError(f"{where}: its {name} is in {columns.unit}; leave out --units {units}")
@@ -190,32 +174,29 @@ def rows_from(
     sizes = {index: factor * values[index] for index, factor in columns.radius.items()}
     first = next(iter(sizes))
     radius = sizes[first].astype(float)
-    for index in (*columns.place, *columns.radius):
-        one = values[index]
-        good = np.isfinite(one) & ((one > 0) | (index in columns.place))
-        expected = "a finite number" if index in columns.place else "a number above 0"
-        _refuse(~good, columns.names[index], one, where, expected)
+
+    def refuse(bad: Array, index: int, expected: str) -> None:
+        """Raise CaseError on the first value of a column that is `bad`."""
+        for row in np.flatnonzero(bad)[:1]:
+            name, value = columns.names[index].strip(), values[index][row]
+            raise CaseError(f"{where(row)}: {name} is {value:g}, expected {expected}")
+
+    for index in columns.place:
+        refuse(~np.isfinite(values[index]), index, "a finite number")
+    for index in columns.radius:
+        refuse(~(np.isfinite(values[index]) & (values[index] > 0)), index, "a number above 0")
+    other = f"what {columns.names[first]} says; remove the column that is wrong"
     for index, size in sizes.items():
-        _refuse(
-            np.abs(size - radius) > _ROUNDING * radius,
-            columns.names[index],
-            values[index],
-            where,
-            f"what {columns.names[first]} says; remove the column that is wrong",
-        )
+        refuse(np.abs(size - radius) > _ROUNDING * radius, index, other)
     if columns.scaled and box is not None:
         position = box[:, 0] + position * np.ptp(box, axis=1)
     whole: dict[str, Any] = {name: values[index] for name, index in columns.others.items()}
     for name, one in whole.items():
         allowed = (one == np.round(one)) & (np.abs(one) <= _LARGEST_WHOLE)
+        expected = "a whole number, none too large"
         if name == "kind":
-            allowed = np.isin(one, list(Kind))
-        expected = (
-            " or ".join(KIND_NAMES) + " (1 or 2)"
-            if name == "kind"
-            else "a whole number, none too large"
-        )
-        _refuse(~allowed, columns.names[columns.others[name]], one, where, expected)
+            allowed, expected = np.isin(one, list(Kind)), f"{' or '.join(KIND_NAMES)} (1 or 2)"
+        refuse(~allowed, columns.others[name], expected)
     return SphereRows(
         scale=scale,
         position=frozen(scale * position),
@@ -223,14 +204,3 @@ def rows_from(
         box=None if box is None else frozen(scale * box),
         **{name: frozen(one, np.int64) for name, one in whole.items()} | more,
     )
-
-
-def _refuse(
-    bad: Array, name: str, values: Array, where: Callable[[int], str], expected: str
-) -> None:
-    """Raise CaseError on the first value that is `bad`."""
-    rows = np.flatnonzero(bad)
-    if len(rows):
-        raise CaseError(
-            f"{where(rows[0])}: {name.strip()} is {values[rows[0]]:g}, expected {expected}"
-        )

@@ -1,7 +1,4 @@
-"""Spheres of one moment, and the small helpers of their arrays.
-
-Read-only arrays, and how a class that owns arrays prints itself.
-"""
+"""Spheres of one moment, their read-only arrays, units and axes."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
@@ -38,10 +35,11 @@ def _short(value: Any) -> str:
         return f"array{value.shape}"
     if isinstance(value, float):
         return f"{value:.6g}"
-    if isinstance(value, tuple | list | dict) and len(repr(value)) > MOST_SHOWN:
-        return f"{len(value)} items"
     text = " ".join(repr(value).split())
-    return text if len(text) <= MOST_SHOWN else f"{type(value).__name__}(...)"
+    if len(text) <= MOST_SHOWN:
+        return text
+    many = isinstance(value, tuple | list | dict)
+    return f"{len(value)} items" if many else f"{type(value).__name__}(...)"
 
 
 # ------------------------------------------------------------------------------------------------
@@ -90,13 +88,6 @@ def sides_of(spheres: "Snapshot", periodic: Directions | None) -> tuple[bool, bo
     if periodic is None:
         return spheres.periodic or (False, False, False)
     return periodic_axes(periodic)
-
-
-def axis_number(axis: str) -> int:
-    """0, 1 or 2 for "x", "y" or "z". Raises CaseError on anything else."""
-    if axis not in ("x", "y", "z"):
-        raise CaseError(f"axis: {axis!r}, expected x, y or z")
-    return "xyz".index(axis)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -170,15 +161,11 @@ class Snapshot:
         }
         for name, shape in shapes.items():
             value = frozen(getattr(self, name), np.int64 if name in ("id", "kind") else np.float64)
+            where = f"snapshot at step {self.step}: {name}"
             if value.shape != shape:
-                raise CaseError(
-                    f"snapshot at step {self.step}: {name} has shape {value.shape}, "
-                    f"expected {shape}"
-                )
+                raise CaseError(f"{where} has shape {value.shape}, expected {shape}")
             if not np.all(np.isfinite(value)):
-                raise CaseError(
-                    f"snapshot at step {self.step}: {name} holds values that are not finite"
-                )
+                raise CaseError(f"{where} holds values that are not finite")
             object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
@@ -186,9 +173,10 @@ class Snapshot:
 
     def __repr__(self) -> str:
         fines = int(np.sum(self.kind == Kind.FINE))
+        counts = {"grain": len(self) - fines, "fine": fines}
+        own = ", ".join(f"{count} {name}{'s' * (count != 1)}" for name, count in counts.items())
         size = " x ".join(f"{1e3 * side:.4g}" for side in np.ptp(self.box, axis=1))
-        grains, fine = _counted(len(self) - fines, "grain"), _counted(fines, "fine")
-        return f"Snapshot({grains}, {fine}, step {self.step}, box {size} mm)"
+        return f"Snapshot({own}, step {self.step}, box {size} mm)"
 
     @classmethod
     def from_arrays(
@@ -229,9 +217,8 @@ class Snapshot:
             bad = radii[~(radii > 0)][0]
             raise CaseError(f"radius holds {bad}, expected numbers above 0, {units}")
         bounds = grain_box(place, radii, kinds) if box is None else checked_box(box)
-        sides = None if periodic is None else periodic_axes(periodic)
         made = resting(scale * place, scale * radii, scale * bounds, kinds)
-        return replace(made, periodic=sides)
+        return made if periodic is None else replace(made, periodic=periodic_axes(periodic))
 
     def turned(self, axis: str) -> "Snapshot":
         """The same spheres with `axis` ("x", "y" or "z") as the new x.
@@ -239,7 +226,9 @@ class Snapshot:
         They are moved so that the box starts at x = 0. The order of the axes stays cyclic: the new
         x, y, z are `axis` and the two that follow it.
         """
-        turn = [(axis_number(axis) + k) % 3 for k in range(3)]
+        if axis not in ("x", "y", "z"):
+            raise CaseError(f"axis: {axis!r}, expected x, y or z")
+        turn = [("xyz".index(axis) + k) % 3 for k in range(3)]
         start = np.array([self.box[turn[0], 0], 0.0, 0.0])
         sides = self.periodic
         return replace(
@@ -295,10 +284,6 @@ def resting(
     )
 
 
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}{'' if count == 1 else 's'}"
-
-
 def _for_each(values: Any, count: int, name: str) -> Array:
     array = np.asarray(values)
     if array.shape not in ((), (count,)):
@@ -336,11 +321,8 @@ def checked_box(box: Any) -> Array:
         bounds = np.diag(bounds)
     if bounds.shape == (3,):
         bounds = np.column_stack([np.zeros(3), bounds])
-    if (
-        bounds.shape not in ((3, 2), (6,))
-        or not np.all(np.isfinite(bounds))
-        or np.any(np.diff(bounds.reshape(3, 2)) <= 0)
-    ):
+    good = bounds.shape in ((3, 2), (6,)) and np.all(np.isfinite(bounds))
+    if not good or np.any(np.diff(bounds.reshape(3, 2)) <= 0):
         raise CaseError(
             f"box: {box!r}, expected three lengths above 0, or six numbers x0,x1,y0,y1,z0,z1 with "
             "each lower bound below the upper"

@@ -22,8 +22,7 @@ from fdnet.spheres.snapshot import Array
 SUFFIXES = (".vtp", ".vtu", ".vtk")
 LEGACY, XML = b"# vtk DataFile", b"<VTKFile"
 _COORDINATES = {name for names in PLACES for name in names}
-_XML_READERS = {b"PolyData": "vtkXMLPolyDataReader"}
-_XML_READERS |= {b"UnstructuredGrid": "vtkXMLUnstructuredGridReader"}
+_KIND = re.compile(rb"<VTKFile[^>]*\btype\s*=\s*[\"'](PolyData|UnstructuredGrid)\b")
 _SECONDS = 600
 _MEMORY, _GROWTH = 2**30, 20
 """Memory that the child may take, bytes, besides this many times the size of the file."""
@@ -41,25 +40,17 @@ def vtk_spheres(data: bytes, source: str, *, units: str | None = None) -> Sphere
     points = arrays.pop("points")
     if not len(points):
         raise CaseError(f"{source}: holds no points; expected spheres, one point each")
-    if points.dtype.kind not in "iuf":
-        raise CaseError(f"{source}: its points are no numbers")
-    usable = {
-        name: values
-        for name, values in arrays.items()
-        if values.shape == (len(points),) and values.dtype.kind in "iuf"
-    }
     plain = {name: named(name) for name in arrays}
     unit = next((f"_{unit}" for one, unit in plain.values() if unit and one in RADII), "")
     data_names = [name for name, (one, _) in plain.items() if one not in _COORDINATES]
     names = (*(f"{axis}{unit}" for axis in "xyz"), *data_names)
     sized = columns_of(names, f"{source}: point data")
-    wanted = [names[index] for index in sized.needed if index >= 3]
-    for name in wanted:
-        if name not in usable:
-            raise CaseError(f"{source}: point data {name} is no number for each point")
+    values = dict(enumerate(points.astype(float).T))
+    for index in sized.needed[3:]:
+        values[index] = one = arrays[names[index]]
+        if one.shape != (len(points),) or one.dtype.kind not in "iuf":
+            raise CaseError(f"{source}: point data {names[index]} is no number for each point")
     scale = scale_of(sized, units, source)
-    values = dict(enumerate(np.asarray(points, dtype=float).T))
-    values |= {names.index(name): usable[name] for name in wanted}
     return rows_from(
         sized,
         values,
@@ -77,18 +68,17 @@ def _read_apart(data: bytes, source: str) -> dict[str, Array]:
     """
     reader = "vtkGenericDataObjectReader"
     if not data.startswith(LEGACY):
-        kind = re.search(rb"<VTKFile[^>]*\btype\s*=\s*[\"'](\w+)", data[:10_000])
-        if kind is None or kind[1] not in _XML_READERS:
-            what = "no VTK file" if kind is None else f"of the type {kind[1].decode()}"
+        kind = _KIND.search(data[:10_000])
+        if kind is None:
             raise CaseError(
-                f"{source}: cannot be read as a VTK file (it is {what}); expected .vtp, .vtu or a "
+                f"{source}: cannot be read as a VTK file of points; expected .vtp, .vtu or a "
                 "legacy .vtk file"
             )
-        reader = _XML_READERS[kind[1]]
+        reader = f"vtkXML{kind[1].decode()}Reader"
     if find_spec("vtkmodules") is None:
         raise CaseError(f"{source}: needs VTK, which is not installed; {VIEW}, or give a table")
-    root = str(Path(__file__).resolve().parents[2])
-    paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
+    root, given = str(Path(__file__).resolve().parents[2]), os.environ.get("PYTHONPATH")
+    paths = os.pathsep.join([root, given] if given else [root])
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "in").write_bytes(data)
         try:
@@ -98,8 +88,7 @@ def _read_apart(data: bytes, source: str) -> dict[str, Array]:
                 check=False,
                 stdin=subprocess.DEVNULL,
                 timeout=_SECONDS,
-                env=os.environ
-                | {"PYTHONPATH": os.pathsep.join(paths), "OPENBLAS_NUM_THREADS": "1"},
+                env=os.environ | {"PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"},
             )
         except subprocess.TimeoutExpired as error:
             raise CaseError(f"{source}: VTK does not end reading it; write it again") from error
@@ -110,8 +99,7 @@ def _read_apart(data: bytes, source: str) -> dict[str, Array]:
             how = f"VTK ended by signal {-done.returncode}" if done.returncode < 0 else how
             raise CaseError(f"{source}: cannot be read as a VTK file ({how}); write it again")
         with np.load(Path(folder) / "out.npz", allow_pickle=False) as arrays:
-            names = [str(name) for name in arrays["names"]]
-            return {name: arrays[str(number)] for number, name in enumerate(names)}
+            return {str(name): arrays[str(k)] for k, name in enumerate(arrays["names"])}
 
 
 def _child(reader_name: str, folder: Path) -> None:
@@ -137,12 +125,12 @@ def _child(reader_name: str, folder: Path) -> None:
     if reader.GetErrorCode() or mesh is None:
         sys.exit(f"VTK reports the error {reader.GetErrorCode()}")
     points = mesh.GetPoints() if hasattr(mesh, "GetPoints") else None
-    by_name = {"points": np.empty((0, 3)) if points is None else vtk_to_numpy(points.GetData())}
-    data: Any = mesh.GetPointData() if points is not None else None
-    for number in range(0 if data is None else data.GetNumberOfArrays()):
-        array = data.GetArray(number)
-        if array is not None and array.GetName():
-            by_name.setdefault(array.GetName(), vtk_to_numpy(array))
+    if points is None:
+        sys.exit("it holds no points")
+    data = mesh.GetPointData()
+    given = filter(None, map(data.GetArray, range(data.GetNumberOfArrays())))
+    by_name = {array.GetName(): vtk_to_numpy(array) for array in given if array.GetName()}
+    by_name["points"] = vtk_to_numpy(points.GetData())
     arrays: dict[str, Any] = {str(k): one for k, one in enumerate(by_name.values())}
     np.savez(folder / "out.npz", names=np.array(list(by_name)), **arrays)
 

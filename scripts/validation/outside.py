@@ -22,7 +22,7 @@ from fdnet.case.file import case_from, set_keys
 from fdnet.case.spheres import SHEAR_RATIO
 from fdnet.dem import deck
 from fdnet.dem.checkpoint import Checkpoints
-from fdnet.dem.invade_deck import write_invade_inputs
+from fdnet.dem.invade_deck import InvadeInputs
 from fdnet.dem.invasion import InvadeStage, invade
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.files import write_text
@@ -241,7 +241,7 @@ def single_fines(
     folder = trial.folder
     (folder / "post").mkdir(parents=True)
     alone = "neigh_modify delay 0\nneigh_modify exclude type 2 2"
-    text = write_invade_inputs(case, scales, grains, folder, ranks=1).text
+    text = InvadeInputs(case, scales, grains, folder).write().text
     text, lines = re.subn("(?m)^neigh_modify delay 0$", alone, text)
     assert lines == 1, f"{lines} lines of the deck choose neighbours, expected 1"
     write_text(folder / "in.invade", text)

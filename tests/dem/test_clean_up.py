@@ -13,13 +13,7 @@ from cut_and_continue import StopError
 
 from fdnet.case.file import case_from
 from fdnet.dem.checkpoint import Cleaned, csv_row
-from fdnet.dem.clean_up import (
-    Start,
-    clean_up,
-    cleaned_points,
-    render_clean_up,
-    turned_drag,
-)
+from fdnet.dem.clean_up import Start, clean_up, cleaned_points, render_clean_up, turned_drag
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError
 from fdnet.run.dem_stages import invaded, invasion_record, packed_grains

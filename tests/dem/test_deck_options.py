@@ -55,10 +55,10 @@ INVADE = {
 PACK = {
     (): ["boundary f f f", f"fix wx1 all {HOOKE} primitive type 2 xplane 0.003 {END}"],
     ("box.sides=periodic",): [
-        *("boundary f p p", f"-fix wy0 all {HOOKE} primitive type 2 yplane 0.0 {END}"),
+        *("boundary f p p", f"-fix wy0 all {HOOKE} primitive type 2 yplane 0.0 {END}")
     ],
     ("grains.packing_stiffness_N_m=2000",): [
-        "fix kn all property/global kn peratomtypepair 2" + 4 * " 2000.0",
+        "fix kn all property/global kn peratomtypepair 2" + 4 * " 2000.0"
     ],
     ("contact.model=hertz",): [f"pair_style gran model hertz {END}"],
 }

@@ -27,11 +27,7 @@ from fdnet.errors import CaseError
 from fdnet.network.field.field import velocity_field
 from fdnet.run.cake import cake_summary, measure_cake
 from fdnet.run.fluid import Movers, NetworkFluid, fluid_of, history_rows, mean_ahead
-from fdnet.run.network_flow import (
-    Renewal,
-    on_each_fine,
-    pore_through,
-)
+from fdnet.run.network_flow import Renewal, on_each_fine, pore_through
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot

@@ -10,7 +10,7 @@ import pytest
 import fdnet
 from fdnet.case.file import case_from, parse_sizes, read_case, read_size_file
 from fdnet.dem.deck import specimen_box
-from fdnet.dem.invade_deck import write_invade_inputs
+from fdnet.dem.invade_deck import InvadeInputs
 from fdnet.dem.supply import (
     batches_of,
     densities,
@@ -115,7 +115,7 @@ def test_materials_have_their_shares_of_mass_and_their_densities(tmp_path):
     assert mass_range(fines)[0] == pytest.approx(2710 * math.pi / 6 * 25e-6**3)
     assert case_from(tomllib.loads(case.toml())) == case
     grain = resting(np.array([[1.5e-3, 1.2e-3, 1.2e-3]]), 2e-4, specimen_box(case))
-    write_invade_inputs(case, scales, grain, tmp_path)
+    InvadeInputs(case, scales, grain, tmp_path).write()
     rows = {}
     for path in [tmp_path / "invade.data", *(tmp_path / "supply").glob("*.data")]:
         lines = path.read_text().split("Atoms\n\n")[1].splitlines()
