@@ -248,8 +248,8 @@ def test_the_fines_take_the_share_of_the_pressure_that_resolved_flow_gives_them(
     pressed = carried_with(fluid, inside)[0].pressed
     network = pressed.groups[:, 0].sum() / (pressed.groups[:, 0].sum() + pressed.grains[0])
     field = velocity_field(fluid.grains, periodic="yz", fines=inside, cells=16)
-    resolved = field.fine_force[:, 0].sum()
-    resolved /= resolved + field.grain_force[:, 0].sum()
+    force = field.forces[0][:, 0]
+    resolved = force[field.grains :].sum() / force.sum()
     assert 0.5 < network / resolved < 2.0
 
 
