@@ -63,15 +63,13 @@ def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
     fines = spheres.fines()
     low, high = spheres.box[0]
     within = (fines.position[:, 0] >= low) & (fines.position[:, 0] < high)
-    depth, thickness = fines.position[within, 0] - low, 0.0
-    if np.any(fines.position[:, 0] < low):
-        thickness = cake_thickness(cake_of(spheres, periodic))
+    depth = fines.position[within, 0] - low
     return Invaded(
         count=int(within.sum()),
         volume=float(4.0 / 3.0 * np.pi * np.sum(fines.radius[within] ** 3)),
         depth=float(depth.max(initial=0.0)),
         depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
-        cake_thickness=thickness,
+        cake_thickness=cake_thickness(cake_of(spheres, periodic)),
     )
 
 
@@ -83,6 +81,8 @@ def cake_of(spheres: Snapshot, periodic: Sequence[bool]) -> Snapshot:
     nor is a chain of them. Contact is a gap of at most 1 % of the smaller diameter.
     """
     low = float(spheres.box[0, 0])
+    if not np.any(spheres.fines().position[:, 0] < low):
+        return spheres.where(np.zeros(len(spheres), bool))
     reach = float(np.max(spheres.radius)) * (2.0 + 4.0 * CONTACT_GAP)
     everything = spheres.where(spheres.position[:, 0] < low + reach)
     upstream = (everything.position[:, 0] < low) & (everything.kind == Kind.FINE)
@@ -276,14 +276,6 @@ MOVED = 1e-9
 """A grain that is displaced by more than this, m, has moved."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Inner:
-    """How many grains and fines lie wholly inside other spheres; they were left out."""
-
-    grains: int
-    fines: int
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Specimen:
     """The parts of an analysis that depend on no law, in SI units.
@@ -294,7 +286,8 @@ class Specimen:
         grains: the grains as they were, and where they ended; those of all copies.
         fines: all fines, those beyond the box among them; None without fines.
         copies: of the cell along x, y and z.
-        inner: how many spheres lie inside others, and were left out for it.
+        inner_grains: number of grains wholly inside other spheres; they were left out.
+        inner_fines: number of fines likewise.
         first: network of the grains as they were.
         network: network of the grains where they ended, the same one unless they moved.
         moved: whether any grain moved by more than 1 nm.
@@ -310,7 +303,8 @@ class Specimen:
     grains: tuple[Snapshot, Snapshot]
     fines: Snapshot | None
     copies: tuple[int, int, int]
-    inner: Inner
+    inner_grains: int
+    inner_fines: int
     first: Network
     network: Network
     moved: bool
@@ -359,7 +353,8 @@ def measure_specimen(
         raise NetworkError(why)
     if len(before):
         check_lengths(before, periodic)
-    before, after, fines, inner = _without_inner(before, after, fines, periodic)
+    given = len(before), 0 if fines is None else len(fines)
+    before, after, fines = _without_inner(before, after, fines, periodic)
     size, shift = np.ptp(box, axis=1), after.position - before.position
     shift -= np.where(periodic, np.round(shift / size) * size, 0.0)  # whole periods do not count
     moved = bool(np.max(np.linalg.norm(shift, axis=1), initial=0.0) > MOVED)
@@ -395,7 +390,8 @@ def measure_specimen(
         grains=grains,
         fines=None if fines is None else repeated(fines, copies),
         copies=copies,
-        inner=inner,
+        inner_grains=given[0] - len(before),
+        inner_fines=0 if fines is None else given[1] - len(fines),
         first=first,
         network=network,
         moved=moved,
@@ -439,8 +435,8 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
             f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
             "no pore holds any; check the box if some should",
         )
-    grains, inner = specimen.grains[0], specimen.inner
-    for count, name in ((inner.grains, "grains"), (inner.fines, "fines")):
+    grains = specimen.grains[0]
+    for count, name in ((specimen.inner_grains, "grains"), (specimen.inner_fines, "fines")):
         if count:
             yield Doubt(
                 "inside-others",
@@ -494,24 +490,16 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
 
 
 def _without_inner(
-    before: Snapshot,
-    after: Snapshot,
-    fines: Snapshot | None,
-    periodic: tuple[bool, bool, bool],
-) -> tuple[Snapshot, Snapshot, Snapshot | None, Inner]:
-    """Grains before and after and fines that add to the solid, and how many do not."""
+    before: Snapshot, after: Snapshot, fines: Snapshot | None, periodic: tuple[bool, bool, bool]
+) -> tuple[Snapshot, Snapshot, Snapshot | None]:
+    """Grains before and after and fines that add to the solid."""
     wholly = inside_others(before, periodic)[0]
     if after is not before or fines is not None:
         together = after if fines is None else after.joined(fines)
         later = inside_others(together, periodic)[0]
-        wholly, hidden = wholly & later[: len(after)], later[len(after) :]
-        fines = fines.where(~hidden) if fines is not None and hidden.any() else fines
-    else:
-        hidden = np.zeros(0, bool)
-    inner = Inner(grains=int(wholly.sum()), fines=int(hidden.sum()))
-    if inner.grains:
-        before, after = before.where(~wholly), after.where(~wholly)
-    return before, after, fines, inner
+        wholly &= later[: len(after)]
+        fines = None if fines is None else fines.where(~later[len(after) :])
+    return before.where(~wholly), after.where(~wholly), fines
 
 
 def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:
