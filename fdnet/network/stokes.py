@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
 from math import ceil, floor, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from scipy import fft
@@ -114,15 +115,10 @@ def divide(edges: Array, cells: int) -> Shape:
 class Response:
     """The symbols of one grid: `nodes` is the shape of its arrays, `difference` the g_d (n,).
 
-    Between planes the last row of an array is of component 0 alone, and on the planes a number is
-    a force or a velocity over the root of 2, since such a node stands for one node of the mirrored
-    cell and all others for two: so S stays symmetric.
-
-    Args:
-        shape: cells.
-        walled: whether the sides across x, y, z are slip planes.
-        scale: (3,) cells' edges along x over those along each axis.
-        planes: whether the sides across x are planes of one pressure.
+    Sides and planes are those of `Lattice`, `scale` (3,) the edges of a cell along x over those
+    along each axis. Between planes the last row of an array is of component 0 alone, and on the
+    planes a number is a force or a velocity over the root of 2, since such a node stands for one
+    node of the mirrored cell and all others for two: so S stays symmetric.
     """
 
     def __init__(
@@ -251,37 +247,52 @@ class Walls:
     __repr__ = one_line
 
 
-def find_walls(lattice: Lattice, component: int, position: Array, radius: Array) -> Walls:
-    """The nodes of a velocity component that carry a force.
+class Marks(NamedTuple):
+    """What is known of each node of a velocity component."""
 
-    Args:
-        lattice: the grid.
-        component: of the velocity, 0, 1 or 2.
-        position: (N, 3) m, centres of the spheres.
-        radius: (N,) m.
+    solid: Array
+    """0 fluid, 1 shell, 2 deeper."""
+    reach: Array
+    """(6, ...) free way ahead and back along x, y, z in cells, at most 1."""
+    nearest: Array
+    """The sphere that shortens the reach most or that a shell node is of."""
+    closest: Array
+    """That least reach, or minus the depth of a shell node."""
+
+
+def find_walls(lattice: Lattice, component: int, position: Array, radius: Array) -> Walls:
+    """The nodes of a velocity component, 0 to 2, that carry a force.
+
+    The spheres have their centres at `position` (N, 3) m and `radius` (N,) m.
     """
     nodes = (lattice.shape[0] + lattice.planes, *lattice.shape[1:])
     stagger = np.where(np.arange(3) == component, 0.0, 0.5)
-    mark, reach = np.zeros(nodes, np.uint8), np.ones((6, *nodes), np.float32)
-    nearest = np.full(nodes, -1, np.int32)
+    marks = Marks(
+        solid=np.zeros(nodes, np.uint8),
+        reach=np.ones((6, *nodes), np.float32),
+        nearest=np.full(nodes, -1, np.int32),
+        closest=np.ones(nodes, np.float32),
+    )
     on_planes = lattice.planes and component == 0
     last = np.array(lattice.shape) - 1
     last[0] += on_planes
     wraps = ~np.array(lattice.walled)
     wraps[0] = not lattice.planes
     _mark(
-        (mark, reach, nearest, np.ones(nodes, np.float32)),
+        marks,
         (position - lattice.low) / lattice.spacing - stagger,
         np.asarray(radius) / lattice.unit,
-        (lattice.spacing / lattice.unit, wraps, last),
+        lattice.spacing / lattice.unit,
+        wraps,
+        last,
         on_planes,
     )
-    solid, drag = mark != 0, np.zeros(nodes)
+    solid, drag = marks.solid != 0, np.zeros(nodes)
     weight = (lattice.unit / lattice.spacing) ** 2
     x = lattice.low[0] + lattice.spacing[0] * (np.arange(nodes[0]) + stagger[0])
     held = (x >= lattice.specimen[0]) & (x <= lattice.specimen[1]) | lattice.repeats
     for axis, side in product(range(3), range(2)):
-        beyond, way = np.roll(solid, 2 * side - 1, axis), reach[2 * axis + side]
+        beyond, way = np.roll(solid, 2 * side - 1, axis), marks.reach[2 * axis + side]
         end = 0 if side else last[axis]
         outside = np.moveaxis(beyond, axis, 0)[end]
         if lattice.walled[axis]:
@@ -290,7 +301,7 @@ def find_walls(lattice: Lattice, component: int, position: Array, radius: Array)
                 np.moveaxis(drag, axis, 0)[end] += 2.0 * weight[axis] * held[:, None]
         elif axis == 0 and on_planes:
             outside[:] = solid[end - 1 + 2 * side]
-            way[end] = reach[1 - side, end]
+            way[end] = marks.reach[1 - side, end]
         elif axis == 0 and lattice.planes:
             outside[:] = False
         wall = beyond & ~solid
@@ -298,31 +309,27 @@ def find_walls(lattice: Lattice, component: int, position: Array, radius: Array)
     free = drag > LEAST_DRAG
     free[solid] = False
     free[last[0] + 1 :] = False
-    carries = free | (mark == 1)
+    carries = free | (marks.solid == 1)
     if lattice.walled[component]:
         np.moveaxis(carries, component, 0)[0] = False
     node = np.flatnonzero(carries)
     slack = np.divide(1.0, drag, out=np.zeros(nodes), where=free).reshape(-1)[node]
-    owner = nearest.reshape(-1)[node]
+    owner = marks.nearest.reshape(-1)[node]
     return Walls(node=node, slack=slack, owner=np.where(owner < 0, SIDE_WALL, owner), solid=solid)
 
 
 @compiled
 def _mark(
-    marks: tuple[Array, Array, Array, Array],
+    marks: Marks,
     centre: Array,
     radius: Array,
-    grid: tuple[Array, Array, Array],
+    step: Array,
+    wraps: Array,
+    last: Array,
     on_planes: bool,
 ) -> None:
-    """Marks nodes for spheres at `centre` (N, 3), in cells, of `radius` (N,).
-
-    The marks are `solid` (0 fluid, 1 shell, 2 deeper), `reach` (6, ...), the free way ahead and
-    back along x, y, z in cells, at most 1, `nearest`, the sphere that shortens the reach most or
-    that a shell node is of, and `closest`, that least reach, or minus the depth of a shell node.
-    """
+    """Marks nodes for spheres at `centre` (N, 3), in cells, of `radius` (N,)."""
     solid, reach, nearest, closest = marks
-    step, wraps, last = grid
     low, high, shape = np.zeros(3, np.int64), np.zeros(3, np.int64), solid.shape
     deep = max(step[0], step[1], step[2])
     apart, at = np.zeros(3), np.zeros(3, np.int64)
@@ -371,10 +378,8 @@ def _mark(
 
 
 OWN_RESPONSE = 2.0 / 3.0 * 0.252731
-"""Velocity of a node under a unit force on itself.
-
-It is 2/3 of the lattice Green's function at 0 (Watson 1939). It only scales the unknowns.
-"""
+"""Velocity of a node under a unit force on itself, which scales the unknowns: 2/3 of the lattice
+Green's function at 0 (Watson 1939)."""
 DIFFERENCES = 10.0
 """Weight of the differences in the preconditioner over that of the forces themselves."""
 
@@ -428,9 +433,7 @@ LARGEST_SLIP = 0.05
 class Problem:
     """The scaled operator A = W (S + D) W over the wall nodes, on arrays (3, n0, n1, n2).
 
-    Args:
-        walls: of the three velocity components.
-        response: S.
+    `walls` are those of the three velocity components, `response` is S.
     """
 
     def __init__(self, walls: list[Walls], response: Response) -> None:
@@ -609,7 +612,7 @@ def solve(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class StokesFlow:
-    """A solved cell.
+    """A solved cell or slab.
 
     Attributes:
         k: permeability along the axis, m2.
@@ -630,12 +633,7 @@ class StokesFlow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """The permeability at zero spacing.
-
-    Attributes:
-        k: m2.
-        error: share of k.
-    """
+    """The permeability at zero spacing: k, m2, and its error as a share of k."""
 
     k: float
     error: float
