@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from html import escape
 from itertools import product
 from typing import TYPE_CHECKING, Any, Unpack
@@ -29,7 +29,13 @@ from fdnet.network.flow.sections import (
 from fdnet.network.laws.damage import CLEAN
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network
-from fdnet.network.specimen import as_snapshot, measure_specimen, pack_doubts, specimen_doubts
+from fdnet.network.specimen import (
+    Invaded,
+    as_snapshot,
+    measure_specimen,
+    pack_doubts,
+    specimen_doubts,
+)
 from fdnet.network.states import Log, Measured, State, at_most_the_grains, few_throats
 from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, sides_of
 
@@ -38,7 +44,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Analysis:
+class Analysis(Invaded):
     """Permeability, porosity and fines of a specimen before and after damage, in SI units.
 
     P pores, T throats. "Damaged" is with the fines; without fines it equals "initial". When the
@@ -74,11 +80,6 @@ class Analysis:
         profile: porosity and fines in finer bins of depth.
         layers: permeability and pressure drop of thin layers of the first millimetre; None unless
             the network of all spheres was solved.
-        invaded_count: number of fines centred in the specimen.
-        invaded_volume: their volume, m3.
-        invasion_depth: depth of the deepest of them, m.
-        invasion_depth_p95: depth above which 95 % of them lie, m.
-        cake_thickness: thickness of the cake upstream of the formation face, m.
         solver: method, residual and mass balance, the worst of all solves.
         copies: how often a periodic cell of a few grains was repeated along x, y and z, so that it
             can be tessellated. The network and the values by pore and throat are of all copies.
@@ -110,11 +111,6 @@ class Analysis:
     sections: tuple[Section, ...]
     profile: Profile
     layers: Layers | None
-    invaded_count: int
-    invaded_volume: float
-    invasion_depth: float
-    invasion_depth_p95: float
-    cake_thickness: float
     solver: Mapping[str, str | float | None]
     copies: tuple[int, int, int]
     counts: Mapping[str, int]
@@ -453,7 +449,7 @@ def _chosen(options: AnalysisChoices | None, choices: AnalysisKeys) -> AnalysisC
 
 def _analysis(measured: Measured, options: AnalysisChoices) -> Analysis:
     specimen, log, law, name = measured.specimen, measured.log, options.law, options.damage_law
-    fines, porosity, invaded = specimen.fines, specimen.porosity, specimen.invaded
+    fines, porosity = specimen.fines, specimen.porosity
     clean, base = measured.clean(law), measured.base(law)
     whole = measured.all_spheres(options)
     of_grains = SECTION_ARCHIE if name in (AUTO, ALL_SPHERES) else name
@@ -525,11 +521,7 @@ def _analysis(measured: Measured, options: AnalysisChoices) -> Analysis:
         sections=sections,
         profile=make_profile(specimen.bins, porosity, specimen.depth),
         layers=layers,
-        invaded_count=invaded.count,
-        invaded_volume=invaded.volume,
-        invasion_depth=invaded.depth,
-        invasion_depth_p95=invaded.depth_p95,
-        cake_thickness=invaded.cake_thickness,
+        **asdict(specimen.invaded),
         solver={
             "method": flows[0].method,
             "residual": max(one.residual for one in flows),

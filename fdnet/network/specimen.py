@@ -36,39 +36,36 @@ gives the fines slower than half the velocity of the fluid best: 2 and 6 % more 
 theirs, 3 contacts give 5 and 19 % less, for small fines lie caged between others."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Invaded:
     """Fines centred in the box, and the cake. The formation face is the low x face, x = 0.
 
     Attributes:
-        count: number of these fines.
-        volume: m3, of whole spheres.
-        depth: m, of the deepest; 0 without fines.
-        depth_p95: m, above which 95 % of them lie; 0 without fines.
-        cake_thickness: m, of the fines that stand upstream of the face.
+        invaded_count: number of fines centred in the specimen.
+        invaded_volume: their volume, m3, of whole spheres.
+        invasion_depth: depth of the deepest of them, m; 0 without fines.
+        invasion_depth_p95: depth above which 95 % of them lie, m; 0 without fines.
+        cake_thickness: thickness of the cake upstream of the formation face, m.
     """
 
-    count: int
-    volume: float
-    depth: float
-    depth_p95: float
+    invaded_count: int
+    invaded_volume: float
+    invasion_depth: float
+    invasion_depth_p95: float
     cake_thickness: float
 
 
 def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
-    """Invasion by the fines of `spheres`; depth is measured from the low x face of the box.
-
-    `periodic` says whether the sides x, y and z are periodic.
-    """
+    """Invasion by the fines of `spheres`; the sides x, y and z may be `periodic`."""
     fines = spheres.fines()
     low, high = spheres.box[0]
     within = (fines.position[:, 0] >= low) & (fines.position[:, 0] < high)
     depth = fines.position[within, 0] - low
     return Invaded(
-        count=int(within.sum()),
-        volume=float(4.0 / 3.0 * np.pi * np.sum(fines.radius[within] ** 3)),
-        depth=float(depth.max(initial=0.0)),
-        depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
+        invaded_count=int(within.sum()),
+        invaded_volume=float(4.0 / 3.0 * np.pi * np.sum(fines.radius[within] ** 3)),
+        invasion_depth=float(depth.max(initial=0.0)),
+        invasion_depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
         cake_thickness=cake_thickness(cake_of(spheres, periodic)),
     )
 
@@ -143,17 +140,15 @@ def wide_fines(grains: Snapshot, fines: Snapshot) -> str:
     largest = int(np.argmax(fines.radius))
     radius, number = float(fines.radius[largest]), int(fines.id[largest])
     side, grain = float(np.ptp(fines.box, axis=1).min()), float(grains.radius.min())
+    one = f"fines: the fine with id {number} has a radius of {radius:.4g} m, "
+    check = "the units of the radii, or which spheres are fines"
     if radius > side / 2:
-        return (
-            f"fines: the fine with id {number} has a radius of {radius:.4g} m, more than half the "
-            f"shortest side of the box ({side / 2:.4g} m); check the units of the radii, or which "
-            "spheres are fines"
-        )
+        half = f"more than half the shortest side of the box ({side / 2:.4g} m)"
+        return f"{one}{half}; check {check}"
     if radius >= grain * (1.0 - LIKE):
         return (
-            f"fines: the fine with id {number} has a radius of {radius:.4g} m, the smallest grain "
-            f"one of {grain:.4g} m; expected fines that are clearly smaller than grains. Check "
-            "the units of the radii, or which spheres are fines"
+            f"{one}the smallest grain one of {grain:.4g} m; expected fines that are clearly "
+            f"smaller than grains. Check {check}"
         )
     return ""
 
@@ -178,11 +173,7 @@ def _crossing(spheres: Snapshot, periodic: tuple[bool, bool, bool], axis: str) -
     count = int(np.sum(beyond.any(axis=1)))
     expected = 2.0 * reach.mean() * len(spheres) * np.sum(walls / (high - low))
     if count > max(MANY * expected, 3):
-        sides = "".join(
-            name
-            for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
-            if crossed or repeats
-        )
+        sides = "".join(np.array([*"xyz"])[beyond.any(axis=0) | np.array(periodic)])
         yield Doubt(
             "crossing-walls",
             f"{count} of {len(spheres)} spheres cross the side walls; if the pack is periodic "
@@ -342,8 +333,7 @@ def measure_specimen(
 ) -> Specimen:
     """The specimen of the grains of `initial` and, unless it is None, of all spheres of `damaged`.
 
-    `timed` takes the name of the stage that its block belongs to. Raises NetworkError and
-    CaseError as `analyse` does.
+    `timed` takes the name of the stage that its block belongs to. Raises as `analyse` does.
     """
     before = initial.grains()
     after = before if damaged is None else _same_grains(before, damaged.grains())
@@ -375,15 +365,14 @@ def measure_specimen(
             occupancy = measure_occupancy(
                 network, repeated(fines, copies), overlap=choices.throat_overlap
             )
-    width = choices.profile_bin_m
-    bins = profile_edges(first.grain_radius if width is None else width, box)
+    bins = profile_edges(choices.profile_bin_m or first.grain_radius, box)
     cuts = np.unique(np.concatenate([edges, bins]))
     spheres = before if fines is None else after.joined(fines)
     with timed("porosity"):
         clean = measure_porosity(before, periodic=periodic, edges=cuts)
-        filled = (
-            clean if fines is None else measure_porosity(spheres, periodic=periodic, edges=cuts)
-        )
+        filled = clean
+        if fines is not None:
+            filled = measure_porosity(spheres, periodic=periodic, edges=cuts)
     place = spheres.fines().position
     x, beyond = place[:, 0], (place < box[:, 0]) | (place > box[:, 1])
     return Specimen(
@@ -422,14 +411,18 @@ def as_snapshot(spheres: object, name: str = "spheres") -> Snapshot:
 def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iterator[str]:
     """Warnings on a specimen and its permeability without fines, m2."""
     network, occupancy = specimen.first, specimen.occupancy
-    if network.counts["grains_outside_box"]:
-        count = network.counts["grains_outside_box"]
+    if count := network.counts["grains_outside_box"]:
         yield Doubt("outside-the-box", f"{count} grains lie outside the box and play no part")
     if (
         occupancy is not None
-        and occupancy.counts["fines_outside_box"]
+        and (count := occupancy.counts["fines_outside_box"])
         and not occupancy.pore_solid_volume.any()
     ):
+        yield Doubt(
+            "no-fine-in-the-box",
+            f"none of the {count} fines is centred in the box: no pore holds any; check the box "
+            "if some should",
+        )
         yield Doubt(
             "no-fine-in-the-box",
             f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fdnet.classes.beside_spheres import Narrowed
-from fdnet.network import geometry
 from fdnet.network.field.field import VelocityField, velocity_field
 from fdnet.network.fines.deposit import (
     Deposit,
@@ -241,7 +240,7 @@ def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -
     middle[:, 1] += network.throat_shift * np.ptp(network.box, axis=1)
     forth = np.sum((middle[:, 1] - middle[:, 0]) * normal, axis=1)
     turned = np.where(forth < 0, -network.throat_share, network.throat_share)
-    whole = geometry.triangle_area(corner)[:, None]
+    whole = np.linalg.norm(normal, axis=1)[:, None]
     return PackFlow(
         network=network,
         clean=clean,

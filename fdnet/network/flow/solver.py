@@ -155,10 +155,9 @@ def dissected(links: sparse.csr_matrix) -> Array:
 def multigrid(matrix: sparse.csr_matrix) -> Solve:
     """Conjugate gradients with a symmetric Ruge-Stuben V-cycle as the preconditioner.
 
-    Nodes that are linked are brought close together in memory (Cuthill and McKee 1969, reversed),
-    which makes a cycle a sixth faster. The solution is NaN where 100 steps do not suffice.
-    Thousands of pores without a link (in a thin slab, or a clogged pack) stay on the coarsest
-    level, which is therefore solved as a sparse system.
+    Nodes that are linked are brought close together in memory (Cuthill and McKee 1969, reversed):
+    a sixth faster. The solution is NaN where 100 steps do not suffice. Pores without a link stay
+    on the coarsest level, which is therefore solved as a sparse system.
     """
     order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
     matrix = matrix[order][:, order]
