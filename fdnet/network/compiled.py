@@ -3,9 +3,8 @@
 numba keeps compiled functions next to their own file and does not notice when a function that they
 call changes in another module. Here the cache lies in a folder named after a digest of all sources
 of this package, of the versions that compile them and of numba's settings, so old code never runs
-for a changed file. All installations with the same digest share it, wherever they lie, so only the
-first one compiles. It also works where the folder of the package cannot be written.
-NUMBA_CACHE_DIR, when set, is used instead, as numba uses it.
+for a changed file, and all installations with the same digest share it. NUMBA_CACHE_DIR, when set,
+is used instead, as numba uses it.
 """
 
 import contextlib
@@ -81,8 +80,6 @@ if not config.CACHE_DIR:  # type: ignore[attr-defined]
     config.CACHE_DIR = str(_SHARED)  # type: ignore[attr-defined]
 
 _COLD = _SHARED is not None and not any(_SHARED.rglob("*.nbi"))
-
-
 _said: set[str] = set()
 
 
@@ -168,9 +165,9 @@ def compiled(function: Any, **options: Any) -> Any:
     """The function, compiled by numba when it is first called, with its code kept on disk.
 
     `options` are those of numba's compiler. numba optimises a function anew in each that calls it,
-    directly or not, so a short chain of calls is compiled faster than a long one. An array that is
-    made in compiled code, or set from another or from a tuple, costs half a second more. For a
-    whole number that is written out a function is compiled apart, for `np.int64(0)` it is not.
+    so a short chain of calls is compiled faster than a long one. An array that is made in compiled
+    code, or set from another or from a tuple, costs half a second more. For a whole number that is
+    written out a function is compiled apart, for `np.int64(0)` it is not.
     """
     options = _PLAIN | options
     try:
@@ -246,22 +243,15 @@ _here = threading.local()
 
 
 def on_all_cores(work: Callable[[Part], Result], parts: Iterable[Part]) -> list[Result]:
-    """What `work` gives for each of the `parts`, on up to `MOST_CORES` of the cores.
+    """What `work` gives for each of the `parts`, on up to `MOST_CORES` of `cores_of_numba`.
 
-    The cores are all of this process, or as many as the environment variable NUMBA_NUM_THREADS
-    says. Only functions that are `compiled_for_loops` run side by side, so most of the work should
-    be in them. No part may write to what another one reads or writes, so the result does not
-    depend on the number of cores. Work that is such a part itself does its own parts one after
-    the other. The first error of a part is raised.
+    Only functions that are `compiled_for_loops` run side by side. No part may write to what
+    another one reads or writes, so the result does not depend on the number of cores. Work that is
+    such a part itself does its own parts one after the other. The first error of a part is raised.
     """
     every = list(parts)
     cores = min(cores_of_numba(), MOST_CORES, len(every))
     if cores <= 1 or getattr(_here, "is_part", False):
         return [work(part) for part in every]
-    with ThreadPoolExecutor(cores, initializer=_mark) as pool:
+    with ThreadPoolExecutor(cores, initializer=setattr, initargs=(_here, "is_part", True)) as pool:
         return list(pool.map(work, every))
-
-
-def _mark() -> None:
-    """Marks this thread as one of those that do parts."""
-    _here.is_part = True

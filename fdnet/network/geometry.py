@@ -1,8 +1,7 @@
 """Tetrahedra, triangles and the spheres on their corners.
 
-Lengths are in m. Arrays may have any leading shape, written "...": a function that takes
-tetrahedra (..., 4, 3) takes one of shape (4, 3) as well as P of shape (P, 4, 3). What is measured
-on every tetrahedron or facet of a pack is compiled, in `tessellation`.
+Lengths are in m. Arrays may have any leading shape, written "...". What is measured on every
+tetrahedron or facet of a pack is compiled, in `tessellation`.
 """
 
 from collections.abc import Iterator
@@ -52,12 +51,6 @@ def flat(triangle: Array) -> Array:
     placed[..., 2, 0] = dot(ab, ac) / base
     placed[..., 2, 1] = np.linalg.norm(cross(ab, ac), axis=-1) / base
     return placed
-
-
-def triangle_area(triangle: Array) -> Array:
-    """Area (...) m2 of triangles (..., 3, 3)."""
-    ab, ac = triangle[..., 1, :] - triangle[..., 0, :], triangle[..., 2, :] - triangle[..., 0, :]
-    return 0.5 * np.linalg.norm(cross(ab, ac), axis=-1)
 
 
 def cap_volume(radius: Array, height: Array) -> Array:

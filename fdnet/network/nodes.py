@@ -10,7 +10,7 @@ which a hole in a deposit is, the flow then meets next to no resistance.
 Pores of one polyhedron, such as those that a face of the box cuts, keep its power centre.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from fdnet.network.compiled import compiled_for_loops, loops_in_place
 from fdnet.network.geometry import FACETS
 from fdnet.network.network import Network
 from fdnet.network.tessellation.delaunay import along, less, times
-from fdnet.spheres.snapshot import Array, frozen, one_line
+from fdnet.spheres.snapshot import Array, frozen
 
 CENTRE = 4
 """The row of the power centre, after those of the four corners of a tetrahedron."""
@@ -26,8 +26,7 @@ ON_FACET = 1e-9
 """A node that is nearer to a facet, in lengths of the facet, lies on it: its height is 0."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Nodes:
+class Nodes(NamedTuple):
     """The nodes of the pores (P) of a network, above the facets of its throats (T).
 
     Attributes:
@@ -40,57 +39,39 @@ class Nodes:
     position: Array
     heights: Array
 
-    __repr__ = one_line
-
 
 def nodes_of(network: Network) -> Nodes:
     """The nodes of all pores."""
     alone = np.bincount(network.pore_group)[network.pore_group] == 1
     node, moved = np.array(network.pore_power_centre), np.zeros(len(alone), bool)
     height, size = np.array(network.throat_heights), np.ptp(network.box, axis=1)
-    _move_inside(
-        node, moved, network.image_position, size, network.pore_images, network.pore_wrap, alone
-    )
-    _set_heights(
-        height,
-        node,
-        moved,
-        network.image_position,
-        size,
-        network.throat_images,
-        network.throat_pores,
-        network.throat_shift,
-        network.pore_wrap,
-    )
-    return Nodes(position=frozen(node), heights=frozen(height))
+    place, images, pores = network.image_position, network.throat_images, network.throat_pores
+    _move_inside(node, moved, place, size, network.pore_images, network.pore_wrap, alone)
+    turn, wrap = network.throat_shift * size, network.pore_wrap * size
+    _set_heights(height, node, moved, place, images, pores, turn, wrap)
+    return Nodes(frozen(node), frozen(height))
 
 
 @compiled_for_loops
 def _move_inside(
-    node: Array,
-    moved: Array,
-    position: Array,
-    size: Array,
-    vertex: Array,
-    wrap: Array,
-    alone: Array,
+    node: Array, moved: Array, place: Array, size: Array, vertex: Array, wrap: Array, alone: Array
 ) -> None:
     """Moves the nodes of pores that stand alone into their tetrahedra, and marks the moved."""
-    corner, best, place = np.empty((5, 3)), np.empty(3), np.empty(3)
+    corner, best, near = np.empty((5, 3)), np.empty(3), np.empty(3)
     for p in range(len(node)):
         if not alone[p]:
             continue
         for k in range(4):
             for axis in range(3):
-                corner[k, axis] = position[vertex[p, k], axis] - wrap[p, axis] * size[axis]
+                corner[k, axis] = place[vertex[p, k], axis] - wrap[p, axis] * size[axis]
         corner[CENTRE] = node[p]
         nearest = np.inf
         for k in range(4):
             if _behind(corner, k):
-                square = _set_nearest(corner, k, place)
+                square = _set_nearest(corner, k, near)
                 if square < nearest:
                     nearest = square
-                    best[:] = place
+                    best[:] = near
         if nearest < np.inf:
             moved[p] = True
             node[p] = best
@@ -144,22 +125,21 @@ def _set_heights(
     height: Array,
     node: Array,
     moved: Array,
-    position: Array,
-    size: Array,
+    place: Array,
     facets: Array,
     pores: Array,
-    shift: Array,
+    turn: Array,
     wrap: Array,
 ) -> None:
-    """Sets the heights (T, 2) m of nodes that were moved."""
+    """Sets the heights (T, 2) m of nodes that were moved; `turn` and `wrap` are shifts in m."""
     facet = np.empty((3, 3))
     for t in range(len(facets)):
-        if not (moved[pores[t, 0]] or moved[pores[t, 1]]):
+        one = pores[t, 0]
+        if not (moved[one] or moved[pores[t, 1]]):
             continue
         for k in range(3):
             for axis in range(3):
-                turn = wrap[pores[t, 0], axis] * size[axis]
-                facet[k, axis] = position[facets[t, k], axis] - turn
+                facet[k, axis] = place[facets[t, k], axis] - wrap[one, axis]
         normal = times(less(facet, 1, 0), less(facet, 2, 0))
         long = np.sqrt(along(normal, normal))
         for side in range(2):
@@ -167,7 +147,7 @@ def _set_heights(
             if moved[pore]:
                 total = 0.0
                 for axis in range(3):
-                    turn = shift[t, axis] * side * size[axis]
-                    total += normal[axis] * (node[pore, axis] + turn - facet[0, axis])
+                    away = node[pore, axis] + turn[t, axis] * side - facet[0, axis]
+                    total += normal[axis] * away
                 above = abs(total) / long
                 height[t, side] = above if above > ON_FACET * np.sqrt(long) else 0.0

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from html import escape
 from itertools import product
 from typing import TYPE_CHECKING, Any, Unpack
@@ -30,19 +30,13 @@ from fdnet.network.laws.damage import CLEAN
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network
 from fdnet.network.specimen import (
+    Invaded,
     as_snapshot,
     measure_specimen,
     pack_doubts,
     specimen_doubts,
 )
-from fdnet.network.states import (
-    Log,
-    Measured,
-    Sides,
-    State,
-    at_most_the_grains,
-    few_throats,
-)
+from fdnet.network.states import Log, Measured, State, at_most_the_grains, few_throats
 from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, sides_of
 
 if TYPE_CHECKING:
@@ -50,7 +44,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Analysis:
+class Analysis(Invaded):
     """Permeability, porosity and fines of a specimen before and after damage, in SI units.
 
     P pores, T throats. "Damaged" is with the fines; without fines it equals "initial". When the
@@ -67,8 +61,7 @@ class Analysis:
         damage_law_other: name of the second damage law, of the network of the grains, where it
             was computed as well; else None. Values by pore and throat are then by it.
         k_damaged_other: permeability with fines by that law, m2; else None. The difference to
-            `k_damaged` is a measure of the error. It is by the network alone, also where
-            `k_initial` is by resolved flow in part.
+            `k_damaged` is a measure of the error.
         conductance_initial: (T,) clean conductance of each throat, m3 (flux times viscosity over
             pressure drop).
         conductance_damaged: (T,) the same with fines, m3.
@@ -87,11 +80,6 @@ class Analysis:
         profile: porosity and fines in finer bins of depth.
         layers: permeability and pressure drop of thin layers of the first millimetre; None unless
             the network of all spheres was solved.
-        invaded_count: number of fines centred in the specimen.
-        invaded_volume: their volume, m3.
-        invasion_depth: depth of the deepest of them, m.
-        invasion_depth_p95: depth above which 95 % of them lie, m.
-        cake_thickness: thickness of the cake upstream of the formation face, m.
         solver: method, residual and mass balance, the worst of all solves.
         copies: how often a periodic cell of a few grains was repeated along x, y and z, so that it
             can be tessellated. The network and the values by pore and throat are of all copies.
@@ -123,11 +111,6 @@ class Analysis:
     sections: tuple[Section, ...]
     profile: Profile
     layers: Layers | None
-    invaded_count: int
-    invaded_volume: float
-    invasion_depth: float
-    invasion_depth_p95: float
-    cake_thickness: float
     solver: Mapping[str, str | float | None]
     copies: tuple[int, int, int]
     counts: Mapping[str, int]
@@ -154,17 +137,15 @@ def laws_apart(taken: tuple[str, float], other: tuple[str, float]) -> Iterator[s
     """A warning where the k (m2) of two laws, each with its name, differ by much."""
     (name, k), (second, k_second) = taken, other
     low, high = min(k, k_second), max(k, k_second)
-    if high <= APART * low:
-        return
     start = f"two ways of measuring the damage differ: {second} gives {k_second:.4g} m2"
-    if low > 0:
+    if low > 0 and high > APART * low:
         more = "above" if k_second > k else "below"
         yield Doubt(
             "laws-apart",
             f"{start}, {more} the {k:.4g} m2 of {name} (the larger is {high / low:.2f} times the "
             "smaller); take the difference as the error of the damaged permeability",
         )
-    else:
+    elif high > APART * low:
         yield Doubt("laws-apart", f"{start}, {name} {k:.4g} m2; one of them finds no open path")
 
 
@@ -260,14 +241,9 @@ def compare(
     clean pack is solved once for each conductance law.
 
     Args:
-        spheres: grains and fines, m, as for `analyse`.
-        damaged: as for `analyse`.
-        periodic: sides that repeat, as for `analyse`.
-        axis: direction of the flow, as for `analyse`.
+        spheres, damaged, periodic, axis, options, choices: as for `analyse`.
         laws: pairs (law, damage law). Without it every law with every damage law, or with the
             chosen one where there are no fines.
-        options: choices of the analysis, as for `analyse`.
-        choices: single choices by name, as for `analyse`.
 
     Yields:
         One `Analysis` (permeabilities in m2) for each pair, in their order; its `seconds` are
@@ -300,10 +276,10 @@ def compare(
     chosen = [base.changed(law=law, damage_law=damage_law) for law, damage_law in laws]
     log = Log()
     specimen = measure_specimen(spheres, damaged, periodic=around, choices=base, timed=log.timed)
-    measured = Measured(specimen=specimen, sides=Sides(periodic=around, walls=base.walls))
+    measured = Measured(specimen=specimen, log=log)
     for one in chosen:
-        yield _analysis(measured, one, log)
-        log = Log()
+        yield _analysis(measured, one)
+        measured.log = Log()
 
 
 # ------------------------------------------------------------------------------------------------
@@ -312,8 +288,6 @@ def compare(
 
 THINNEST = 1e-3
 """Least volume of spheres over that of their box that is no slip of units."""
-
-
 _DIGITS: Any = {"index": False, "float_format": "{:.4g}".format}
 
 
@@ -473,26 +447,25 @@ def _chosen(options: AnalysisChoices | None, choices: AnalysisKeys) -> AnalysisC
     return AnalysisChoices.of_pack(**choices) if options is None else options.changed(**choices)
 
 
-def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysis:
-    specimen, law, name = measured.specimen, options.law, options.damage_law
-    fines, porosity, invaded = specimen.fines, specimen.porosity, specimen.invaded
-    clean, clean_slabs = measured.clean(law, log)
-    base = measured.base(law, log)
-    whole = measured.all_spheres(options, log)
+def _analysis(measured: Measured, options: AnalysisChoices) -> Analysis:
+    specimen, log, law, name = measured.specimen, measured.log, options.law, options.damage_law
+    fines, porosity = specimen.fines, specimen.porosity
+    clean, base = measured.clean(law), measured.base(law)
+    whole = measured.all_spheres(options)
     of_grains = SECTION_ARCHIE if name in (AUTO, ALL_SPHERES) else name
-    final, damage = measured.damaged(options, of_grains, log)
-    k, slabs, flow = clean.k, clean_slabs, final.flow
+    final, damage = measured.damaged(options, of_grains)
+    k, slabs, flow = clean.k, clean.slabs, final.flow
     counts = dict(base.network.counts)
     counts["throats_not_conducting"] = int(np.sum(base.conductance == 0))
     if specimen.occupancy is not None and damage is not None:
         counts |= {**specimen.occupancy.counts, **damage.counts}
         counts["throats_blocked"] = int(specimen.occupancy.blocked.sum())
     counts["isolated_pores"] = final.flow.isolated_pores
-    counts["spheres_dropped"] = specimen.inner.grains + specimen.inner.fines
+    counts["spheres_dropped"] = specimen.inner_grains + specimen.inner_fines
     layers = None
     if whole is not None:
-        log.warnings += [*whole.refused, *few_throats(whole.slabs)]
-        of_sections = None if specimen.moved else clean_slabs
+        log.warnings += [*whole.refused, *few_throats(whole.slabs.flows)]
+        of_sections = None if specimen.moved else clean.slabs
         empty = specimen.empty_sections()
         whole, above = at_most_the_grains(whole, base.k, of_sections, specimen.edges, empty)
         counts |= above
@@ -506,21 +479,22 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
                     f"{of_grains} gives {final.k:.4g} m2 with fines",
                 )
             )
-        k, slabs, flow = whole.k, whole.slabs, whole.state.flow
+        k, slabs, flow = whole.k, whole.slabs, whole.flow
         log.warnings += laws_apart((ALL_SPHERES, k), (of_grains, final.k))
         if fines is not None and clean.halves is not None:
             edges = layer_edges(clean.network.box, 2.0 * float(fines.radius.mean()))
-            layers = _layers(clean, whole.state, edges, specimen.depth)
+            layers = _layers(clean, whole, edges, specimen.depth)
     elif final is not clean:
-        k, slabs = final.k, measured.damaged_slabs(final, options, of_grains, log)
-    sections = make_sections(specimen.edges, porosity, (clean_slabs, slabs), specimen.depth)
+        final = measured.with_fines_slabs(final, options, of_grains)
+        k, slabs = final.k, final.slabs
+    sections = make_sections(specimen.edges, porosity, (clean.slabs, slabs), specimen.depth)
     for which, one in (("k_initial", clean.flow), ("k_damaged", flow)):
         if one.reason:
             log.warnings.append(Doubt("no-open-path", f"{which} = 0: {one.reason}"))
     log.warnings += thin_slabs(sections, 2.0 * clean.network.grain_radius)
     log.warnings += specimen_doubts(specimen, clean.k, options.walls)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
-    flows = [clean.flow, base.flow, final.flow, flow, *clean_slabs.flows, *slabs.flows]
+    flows = [clean.flow, base.flow, final.flow, flow, *clean.slabs.flows, *slabs.flows]
     balances = [one.mass_balance for one in flows if one.mass_balance is not None]
     used = of_grains if whole is None else ALL_SPHERES
     return Analysis(
@@ -547,11 +521,7 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
         sections=sections,
         profile=make_profile(specimen.bins, porosity, specimen.depth),
         layers=layers,
-        invaded_count=invaded.count,
-        invaded_volume=invaded.volume,
-        invasion_depth=invaded.depth,
-        invasion_depth_p95=invaded.depth_p95,
-        cake_thickness=invaded.cake_thickness,
+        **asdict(specimen.invaded),
         solver={
             "method": flows[0].method,
             "residual": max(one.residual for one in flows),
@@ -566,20 +536,20 @@ def _analysis(measured: Measured, options: AnalysisChoices, log: Log) -> Analysi
 
 def _layers(initial: State, damaged: State, edges: Array, depth: Array) -> Layers:
     """Layers between `edges` (B+1,) m of a specimen before and after; `depth` (F,) m of fines."""
-    drops, k = [], []
-    for state in (initial, damaged):
-        network, flow = state.network, state.flow
-        k.append(inplace_permeability(network, flow, edges, state.halves))
-        drops.append(
-            -np.diff(plane_pressures(network, flow, edges, state.halves))
-            if flow.inflow
-            else np.full(len(edges) - 1, np.nan)
-        )
+
+    def drop(state: State) -> Array:
+        if not state.flow.inflow:
+            return frozen(np.full(len(edges) - 1, np.nan))
+        return frozen(-np.diff(plane_pressures(state.network, state.flow, edges, state.halves)))
+
+    def k(state: State) -> Array:
+        return frozen(inplace_permeability(state.network, state.flow, edges, state.halves))
+
     return Layers(
         edges=frozen(edges),
-        k_initial=frozen(k[0]),
-        k_damaged=frozen(k[1]),
-        drop_initial=frozen(drops[0]),
-        drop_damaged=frozen(drops[1]),
+        k_initial=k(initial),
+        k_damaged=k(damaged),
+        drop_initial=drop(initial),
+        drop_damaged=drop(damaged),
         fines_count=frozen(np.histogram(depth, edges)[0]),
     )

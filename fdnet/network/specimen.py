@@ -36,42 +36,37 @@ gives the fines slower than half the velocity of the fluid best: 2 and 6 % more 
 theirs, 3 contacts give 5 and 19 % less, for small fines lie caged between others."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Invaded:
     """Fines centred in the box, and the cake. The formation face is the low x face, x = 0.
 
     Attributes:
-        count: number of these fines.
-        volume: m3, of whole spheres.
-        depth: m, of the deepest; 0 without fines.
-        depth_p95: m, above which 95 % of them lie; 0 without fines.
-        cake_thickness: m, of the fines that stand upstream of the face.
+        invaded_count: number of fines centred in the specimen.
+        invaded_volume: their volume, m3, of whole spheres.
+        invasion_depth: depth of the deepest of them, m; 0 without fines.
+        invasion_depth_p95: depth above which 95 % of them lie, m; 0 without fines.
+        cake_thickness: thickness of the cake upstream of the formation face, m.
     """
 
-    count: int
-    volume: float
-    depth: float
-    depth_p95: float
+    invaded_count: int
+    invaded_volume: float
+    invasion_depth: float
+    invasion_depth_p95: float
     cake_thickness: float
 
 
 def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
-    """Invasion by the fines of `spheres`; depth is measured from the low x face of the box.
-
-    `periodic` says whether the sides x, y and z are periodic.
-    """
+    """Invasion by the fines of `spheres`; the sides x, y and z may be `periodic`."""
     fines = spheres.fines()
     low, high = spheres.box[0]
     within = (fines.position[:, 0] >= low) & (fines.position[:, 0] < high)
-    depth, thickness = fines.position[within, 0] - low, 0.0
-    if np.any(fines.position[:, 0] < low):
-        thickness = cake_thickness(cake_of(spheres, periodic))
+    depth = fines.position[within, 0] - low
     return Invaded(
-        count=int(within.sum()),
-        volume=float(4.0 / 3.0 * np.pi * np.sum(fines.radius[within] ** 3)),
-        depth=float(depth.max(initial=0.0)),
-        depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
-        cake_thickness=thickness,
+        invaded_count=int(within.sum()),
+        invaded_volume=float(4.0 / 3.0 * np.pi * np.sum(fines.radius[within] ** 3)),
+        invasion_depth=float(depth.max(initial=0.0)),
+        invasion_depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
+        cake_thickness=cake_thickness(cake_of(spheres, periodic)),
     )
 
 
@@ -83,6 +78,8 @@ def cake_of(spheres: Snapshot, periodic: Sequence[bool]) -> Snapshot:
     nor is a chain of them. Contact is a gap of at most 1 % of the smaller diameter.
     """
     low = float(spheres.box[0, 0])
+    if not np.any(spheres.fines().position[:, 0] < low):
+        return spheres.where(np.zeros(len(spheres), bool))
     reach = float(np.max(spheres.radius)) * (2.0 + 4.0 * CONTACT_GAP)
     everything = spheres.where(spheres.position[:, 0] < low + reach)
     upstream = (everything.position[:, 0] < low) & (everything.kind == Kind.FINE)
@@ -143,17 +140,15 @@ def wide_fines(grains: Snapshot, fines: Snapshot) -> str:
     largest = int(np.argmax(fines.radius))
     radius, number = float(fines.radius[largest]), int(fines.id[largest])
     side, grain = float(np.ptp(fines.box, axis=1).min()), float(grains.radius.min())
+    one = f"fines: the fine with id {number} has a radius of {radius:.4g} m, "
+    check = "the units of the radii, or which spheres are fines"
     if radius > side / 2:
-        return (
-            f"fines: the fine with id {number} has a radius of {radius:.4g} m, more than half the "
-            f"shortest side of the box ({side / 2:.4g} m); check the units of the radii, or which "
-            "spheres are fines"
-        )
+        half = f"more than half the shortest side of the box ({side / 2:.4g} m)"
+        return f"{one}{half}; check {check}"
     if radius >= grain * (1.0 - LIKE):
         return (
-            f"fines: the fine with id {number} has a radius of {radius:.4g} m, the smallest grain "
-            f"one of {grain:.4g} m; expected fines that are clearly smaller than grains. Check "
-            "the units of the radii, or which spheres are fines"
+            f"{one}the smallest grain one of {grain:.4g} m; expected fines that are clearly "
+            f"smaller than grains. Check {check}"
         )
     return ""
 
@@ -178,11 +173,7 @@ def _crossing(spheres: Snapshot, periodic: tuple[bool, bool, bool], axis: str) -
     count = int(np.sum(beyond.any(axis=1)))
     expected = 2.0 * reach.mean() * len(spheres) * np.sum(walls / (high - low))
     if count > max(MANY * expected, 3):
-        sides = "".join(
-            name
-            for name, crossed, repeats in zip("xyz", beyond.any(axis=0), periodic, strict=True)
-            if crossed or repeats
-        )
+        sides = "".join(np.array([*"xyz"])[beyond.any(axis=0) | np.array(periodic)])
         yield Doubt(
             "crossing-walls",
             f"{count} of {len(spheres)} spheres cross the side walls; if the pack is periodic "
@@ -276,14 +267,6 @@ MOVED = 1e-9
 """A grain that is displaced by more than this, m, has moved."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Inner:
-    """How many grains and fines lie wholly inside other spheres; they were left out."""
-
-    grains: int
-    fines: int
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Specimen:
     """The parts of an analysis that depend on no law, in SI units.
@@ -294,7 +277,8 @@ class Specimen:
         grains: the grains as they were, and where they ended; those of all copies.
         fines: all fines, those beyond the box among them; None without fines.
         copies: of the cell along x, y and z.
-        inner: how many spheres lie inside others, and were left out for it.
+        inner_grains: number of grains wholly inside other spheres; they were left out.
+        inner_fines: number of fines likewise.
         first: network of the grains as they were.
         network: network of the grains where they ended, the same one unless they moved.
         moved: whether any grain moved by more than 1 nm.
@@ -310,7 +294,8 @@ class Specimen:
     grains: tuple[Snapshot, Snapshot]
     fines: Snapshot | None
     copies: tuple[int, int, int]
-    inner: Inner
+    inner_grains: int
+    inner_fines: int
     first: Network
     network: Network
     moved: bool
@@ -348,8 +333,7 @@ def measure_specimen(
 ) -> Specimen:
     """The specimen of the grains of `initial` and, unless it is None, of all spheres of `damaged`.
 
-    `timed` takes the name of the stage that its block belongs to. Raises NetworkError and
-    CaseError as `analyse` does.
+    `timed` takes the name of the stage that its block belongs to. Raises as `analyse` does.
     """
     before = initial.grains()
     after = before if damaged is None else _same_grains(before, damaged.grains())
@@ -359,7 +343,8 @@ def measure_specimen(
         raise NetworkError(why)
     if len(before):
         check_lengths(before, periodic)
-    before, after, fines, inner = _without_inner(before, after, fines, periodic)
+    given = len(before), 0 if fines is None else len(fines)
+    before, after, fines = _without_inner(before, after, fines, periodic)
     size, shift = np.ptp(box, axis=1), after.position - before.position
     shift -= np.where(periodic, np.round(shift / size) * size, 0.0)  # whole periods do not count
     moved = bool(np.max(np.linalg.norm(shift, axis=1), initial=0.0) > MOVED)
@@ -380,22 +365,22 @@ def measure_specimen(
             occupancy = measure_occupancy(
                 network, repeated(fines, copies), overlap=choices.throat_overlap
             )
-    width = choices.profile_bin_m
-    bins = profile_edges(first.grain_radius if width is None else width, box)
+    bins = profile_edges(choices.profile_bin_m or first.grain_radius, box)
     cuts = np.unique(np.concatenate([edges, bins]))
     spheres = before if fines is None else after.joined(fines)
     with timed("porosity"):
         clean = measure_porosity(before, periodic=periodic, edges=cuts)
-        filled = (
-            clean if fines is None else measure_porosity(spheres, periodic=periodic, edges=cuts)
-        )
+        filled = clean
+        if fines is not None:
+            filled = measure_porosity(spheres, periodic=periodic, edges=cuts)
     place = spheres.fines().position
     x, beyond = place[:, 0], (place < box[:, 0]) | (place > box[:, 1])
     return Specimen(
         grains=grains,
         fines=None if fines is None else repeated(fines, copies),
         copies=copies,
-        inner=inner,
+        inner_grains=given[0] - len(before),
+        inner_fines=0 if fines is None else given[1] - len(fines),
         first=first,
         network=network,
         moved=moved,
@@ -426,21 +411,25 @@ def as_snapshot(spheres: object, name: str = "spheres") -> Snapshot:
 def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iterator[str]:
     """Warnings on a specimen and its permeability without fines, m2."""
     network, occupancy = specimen.first, specimen.occupancy
-    if network.counts["grains_outside_box"]:
-        count = network.counts["grains_outside_box"]
+    if count := network.counts["grains_outside_box"]:
         yield Doubt("outside-the-box", f"{count} grains lie outside the box and play no part")
     if (
         occupancy is not None
-        and occupancy.counts["fines_outside_box"]
+        and (count := occupancy.counts["fines_outside_box"])
         and not occupancy.pore_solid_volume.any()
     ):
+        yield Doubt(
+            "no-fine-in-the-box",
+            f"none of the {count} fines is centred in the box: no pore holds any; check the box "
+            "if some should",
+        )
         yield Doubt(
             "no-fine-in-the-box",
             f"none of the {occupancy.counts['fines_outside_box']} fines is centred in the box: "
             "no pore holds any; check the box if some should",
         )
-    grains, inner = specimen.grains[0], specimen.inner
-    for count, name in ((inner.grains, "grains"), (inner.fines, "fines")):
+    grains = specimen.grains[0]
+    for count, name in ((specimen.inner_grains, "grains"), (specimen.inner_fines, "fines")):
         if count:
             yield Doubt(
                 "inside-others",
@@ -494,24 +483,16 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
 
 
 def _without_inner(
-    before: Snapshot,
-    after: Snapshot,
-    fines: Snapshot | None,
-    periodic: tuple[bool, bool, bool],
-) -> tuple[Snapshot, Snapshot, Snapshot | None, Inner]:
-    """Grains before and after and fines that add to the solid, and how many do not."""
+    before: Snapshot, after: Snapshot, fines: Snapshot | None, periodic: tuple[bool, bool, bool]
+) -> tuple[Snapshot, Snapshot, Snapshot | None]:
+    """Grains before and after and fines that add to the solid."""
     wholly = inside_others(before, periodic)[0]
     if after is not before or fines is not None:
         together = after if fines is None else after.joined(fines)
         later = inside_others(together, periodic)[0]
-        wholly, hidden = wholly & later[: len(after)], later[len(after) :]
-        fines = fines.where(~hidden) if fines is not None and hidden.any() else fines
-    else:
-        hidden = np.zeros(0, bool)
-    inner = Inner(grains=int(wholly.sum()), fines=int(hidden.sum()))
-    if inner.grains:
-        before, after = before.where(~wholly), after.where(~wholly)
-    return before, after, fines, inner
+        wholly &= later[: len(after)]
+        fines = None if fines is None else fines.where(~later[len(after) :])
+    return before.where(~wholly), after.where(~wholly), fines
 
 
 def _same_grains(before: Snapshot, after: Snapshot) -> Snapshot:

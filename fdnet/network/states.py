@@ -13,18 +13,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import Doubt, FlowError, NetworkError
-from fdnet.names import (
-    ALL_SPHERES,
-    AUTO,
-    DEFAULT_LAW,
-    MOST_SPHERES,
-    SECTION_ARCHIE,
-)
+from fdnet.names import ALL_SPHERES, AUTO, DEFAULT_LAW, MOST_SPHERES, SECTION_ARCHIE
 from fdnet.network.compiled import on_all_cores
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import Flow
@@ -44,42 +39,12 @@ from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line
 
 Conduct = Callable[[Network], Array]
 """Conductance (T,) m3 of the throats of a network."""
+Cut = list[Network | NetworkError]
+"""The networks of S slabs, each of its own spheres alone, or why these make none."""
 
 
 SHALLOW = 1e-6
 """A cap of less height, in radii of its sphere, is none: its sphere touches the plane."""
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Sides:
-    """What the sides of a specimen are.
-
-    Attributes:
-        periodic: whether x, y and z repeat.
-        walls: "slip" or "no-slip", for the y and z sides that do not.
-    """
-
-    periodic: tuple[bool, bool, bool]
-    walls: str
-
-    __repr__ = one_line
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class CutNetworks:
-    """The networks of S slabs, each of its own spheres alone.
-
-    Attributes:
-        edges: (S+1,) m.
-        networks: S networks; None where the spheres of a slab make none.
-        refused: why not, one sentence for each of these.
-    """
-
-    edges: Array
-    networks: tuple[Network | None, ...]
-    refused: tuple[str, ...]
-
-    __repr__ = one_line
 
 
 def cut_out(spheres: Snapshot, span: tuple[float, float], periodic: Sequence[bool]) -> Snapshot:
@@ -90,12 +55,11 @@ def cut_out(spheres: Snapshot, span: tuple[float, float], periodic: Sequence[boo
     box = spheres.box.copy()
     box[0] = span
     if periodic[0]:
-        margin = np.array([float(spheres.radius.max()), np.nan, np.nan])
         images = make_images(
             spheres.position,
             spheres.box,
             periodic=(True, False, False),
-            margin=margin,
+            margin=np.array([float(spheres.radius.max()), np.nan, np.nan]),
             tolerance=0.0,
         )
         spheres = replace(spheres.where(images.owner), position=images.position)
@@ -104,48 +68,33 @@ def cut_out(spheres: Snapshot, span: tuple[float, float], periodic: Sequence[boo
     return replace(spheres.where(reaches), box=box)
 
 
-def cut_networks(spheres: Snapshot, edges: Array, sides: Sides) -> CutNetworks:
-    """The network of each slab between `edges` (S+1,) m, whose skeleton is all of `spheres`."""
-    around = (False, *sides.periodic[1:])
+def cut_networks(spheres: Snapshot, edges: Array, like: Network) -> Cut:
+    """The network of each slab between `edges` (S+1,) m, whose skeleton is all of `spheres`.
+
+    Its sides y and z are those of the network `like`.
+    """
 
     def cut(span: tuple[float, float]) -> Network | NetworkError:
         try:
-            alone = cut_out(spheres, span, sides.periodic)
-            return build_network(alone, periodic=around, walls=sides.walls)
+            alone = cut_out(spheres, span, like.periodic)
+            return build_network(alone, periodic=(False, *like.periodic[1:]), walls=like.walls)
         except NetworkError as error:
             return error
 
-    results = on_all_cores(cut, pairwise(map(float, edges)))
-    refused = [
+    return on_all_cores(cut, pairwise(map(float, edges)))
+
+
+def refused_slabs(cut: Cut) -> tuple[str, ...]:
+    """A warning for each slab whose spheres make no network."""
+    return tuple(
         Doubt(
             "section-without-a-network",
-            f"section {number + 1} is no specimen of its own, so it was cut out of the network of "
+            f"section {number} is no specimen of its own, so it was cut out of the network of "
             f"the whole, which is less accurate: {error}",
         )
-        for number, error in enumerate(results)
+        for number, error in enumerate(cut, start=1)
         if isinstance(error, NetworkError)
-    ]
-    networks = (None if isinstance(one, NetworkError) else one for one in results)
-    return CutNetworks(edges=edges, networks=tuple(networks), refused=tuple(refused))
-
-
-def slab_permeabilities(
-    slabs: CutNetworks, conduct: Conduct, whole: tuple[Network, Array]
-) -> list[tuple[float, Flow]]:
-    """Permeability m2 of each of the S slabs cut out, and its flow.
-
-    The throats of a slab have the conductance `conduct`. A slab without a network of its own is
-    cut out of that of the `whole` specimen, which is given with its conductances (T,) m3.
-    """
-
-    def one(slab: tuple[Network | None, tuple[float, float]]) -> tuple[float, Flow]:
-        network, span = slab
-        if network is None:
-            return slab_permeability(*whole, span)
-        return whole_permeability(network, conduct(network))
-
-    spans = pairwise(map(float, slabs.edges))
-    return on_all_cores(one, zip(slabs.networks, spans, strict=True))
+    )
 
 
 # ------------------------------------------------------------------------------------------------
@@ -170,12 +119,22 @@ class Log:
         self.seconds[stage] += time.perf_counter() - start
 
 
+NO_SLABS = SlabK(cut_out=frozen([]), inplace=frozen([]), flows=())
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class State:
-    """A network with the conductance (T,) m3 of its throats, its flow through the box and k, m2.
+    """A network with the conductance of its throats, its flow and its permeability.
 
-    `halves` (T, 2) 1/m3 are the resistances of the two halves of the throats, by which the
-    pressure falls along them; None for laws that have none.
+    Attributes:
+        network: pores and throats.
+        conductance: (T,) m3.
+        flow: through the box.
+        k: m2, of the whole specimen.
+        halves: (T, 2) 1/m3, resistances of the two halves of the throats, by which the pressure
+            falls along them; None for laws that have none.
+        slabs: permeability of the sections, cut out and in place; of none where nobody asked.
+        refused: sections whose spheres make no network of their own, one sentence each.
     """
 
     network: Network
@@ -183,14 +142,14 @@ class State:
     flow: Flow
     k: float
     halves: Array | None
+    slabs: SlabK = NO_SLABS
+    refused: tuple[str, ...] = ()
 
     __repr__ = one_line
 
 
-def make_state(
-    network: Network, conductance: Array, log: Log, *, halves: Array | None = None
-) -> State:
-    """The state of a network with this conductance (T,) m3."""
+def make_state(network: Network, conductance: Array, halves: Array | None, log: Log) -> State:
+    """The state of a network with this conductance (T,) m3, without its sections."""
     with log.timed("solve"):
         k, flow = whole_permeability(network, conductance)
     return State(network=network, conductance=conductance, flow=flow, k=k, halves=halves)
@@ -201,34 +160,37 @@ def clean_state(network: Network, law: str, log: Log) -> State:
     with log.timed("conductance"):
         halves = grain_resistances(network) if law == DEFAULT_LAW else None
         conductance = LAWS[law](network) if halves is None else 1.0 / halves.sum(axis=1)
-    return make_state(network, frozen(conductance), log, halves=halves)
+    return make_state(network, frozen(conductance), halves, log)
 
 
-def state_slabs(
-    state: State, edges: Array, log: Log, *, cut: CutNetworks | None, conduct: Conduct
-) -> SlabK:
-    """Permeability of the slabs between `edges` (S+1,) m, cut out and in place.
+def with_slabs(state: State, edges: Array, cut: Cut | None, conduct: Conduct, log: Log) -> State:
+    """The state with its slabs between `edges` (S+1,) m, cut out and in place.
 
-    `cut` are the slabs' own networks, whose throats have the conductance `conduct`. Without it the
-    throats of the whole network are cut at the planes (Shi 2011, section 3.3.1).
+    `cut` are the slabs' own networks, whose throats have the conductance `conduct`. Without it,
+    and for a slab that makes none, the throats of the whole network are cut at the planes (Shi
+    2011, section 3.3.1).
     """
-    network = state.network
+    network, spans = state.network, [*pairwise(map(float, edges))]
+
+    def one(slab: tuple[object, tuple[float, float]]) -> tuple[float, Flow]:
+        alone, span = slab
+        if isinstance(alone, Network):
+            return whole_permeability(alone, conduct(alone))
+        return slab_permeability(network, state.conductance, span)
+
     with log.timed("solve"):
-        if len(edges) == 2 and not network.periodic[0]:  # one slab is the whole box
+        if len(spans) == 1 and not network.periodic[0]:  # one slab is the whole box
             parts = [(state.k, state.flow)]
-        elif cut is not None:
-            parts = slab_permeabilities(cut, conduct, (network, state.conductance))
         else:
-            parts = [
-                slab_permeability(network, state.conductance, (float(low), float(high)))
-                for low, high in pairwise(edges)
-            ]
+            networks: Sequence[object] = cut or [None] * len(spans)
+            parts = on_all_cores(one, zip(networks, spans, strict=True))
         inplace = inplace_permeability(network, state.flow, edges, state.halves)
-    return SlabK(
+    slabs = SlabK(
         cut_out=frozen([k for k, _ in parts]),
         inplace=frozen(inplace),
         flows=tuple(flow for _, flow in parts),
     )
+    return replace(state, slabs=slabs)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -240,39 +202,20 @@ def state_slabs(
 # count with what they have inside, as grains do.
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class AllSpheres:
-    """Permeability of grains and fines from the network of all spheres.
-
-    Attributes:
-        state: the network, its flow, and the resistances of its throats.
-        k: m2, of the whole specimen.
-        slabs: of each section, cut out and in place.
-        refused: sections whose spheres make no network of their own, one sentence each.
-    """
-
-    state: State
-    k: float
-    slabs: SlabK
-    refused: tuple[str, ...]
-
-    __repr__ = one_line
-
-
 def all_conductances(network: Network) -> Array:
     """Conductance (T,) m3 of the throats between spheres of any size."""
     return 1.0 / deposit_resistances(network).sum(axis=1)
 
 
-def measure_all_spheres(spheres: Snapshot, edges: Array, *, sides: Sides, log: Log) -> AllSpheres:
-    """Permeability of all `spheres` together, of the whole and of the slabs between `edges` m.
+def all_spheres_state(spheres: Snapshot, edges: Array, like: Network, log: Log) -> State:
+    """The state of all `spheres` together, with the slabs between `edges` m.
 
-    Raises NetworkError where grains and fines make no network (`build_network`), and FlowError as
-    `solve_flow` does.
+    The sides are those of the network `like`. Raises NetworkError where grains and fines make no
+    network (`build_network`), and FlowError as `solve_flow` does.
     """
     with log.timed("tessellate"):
         try:
-            network = build_network(spheres, periodic=sides.periodic, walls=sides.walls)
+            network = build_network(spheres, periodic=like.periodic, walls=like.walls)
         except NetworkError as error:
             raise NetworkError(
                 f"all-spheres: grains and fines together make no network: {error}; use "
@@ -280,16 +223,12 @@ def measure_all_spheres(spheres: Snapshot, edges: Array, *, sides: Sides, log: L
             ) from error
     with log.timed("conductance"):
         halves = deposit_resistances(network)
-    state, cut = make_state(network, 1.0 / halves.sum(axis=1), log, halves=halves), None
-    if len(edges) > 2 or sides.periodic[0]:
+    state, cut = make_state(network, 1.0 / halves.sum(axis=1), halves, log), None
+    if len(edges) > 2 or like.periodic[0]:
         with log.timed("tessellate"):
-            cut = cut_networks(spheres, edges, sides)
-    return AllSpheres(
-        state=state,
-        k=state.k,
-        slabs=state_slabs(state, edges, log, cut=cut, conduct=all_conductances),
-        refused=() if cut is None else cut.refused,
-    )
+            cut = cut_networks(spheres, edges, like)
+    state = with_slabs(state, edges, cut, all_conductances, log)
+    return replace(state, refused=refused_slabs(cut or []))
 
 
 FEW_THROATS = 100
@@ -298,21 +237,21 @@ permeability with fines is off by 5 % (rms), above which by 2 % (docs/evidence/a
 
 
 def at_most_the_grains(
-    whole: AllSpheres, k_grains: float, grains: SlabK | None, edges: Array, empty: Array
-) -> tuple[AllSpheres, dict[str, int]]:
+    whole: State, k_grains: float, grains: SlabK | None, edges: Array, empty: Array
+) -> tuple[State, dict[str, int]]:
     """The permeabilities with fines, at most those of the grains, and how many were above.
 
     Fines never raise the permeability. Where few of them make the network finer, its k may be
     above that of the grains by the difference of two errors; it is then set to that of the grains.
 
     Args:
-        whole: the network of all spheres.
+        whole: the network of all spheres, with its slabs.
         k_grains: m2, of the grains where they ended.
         grains: of their sections; None where the invasion moved the grains.
         edges: (S+1,) m, of the sections.
         empty: (S,) whether no fine reaches into a section.
     """
-    k, slabs, network = whole.k, whole.slabs, whole.state.network
+    k, slabs, network = whole.k, whole.slabs, whole.network
     above, sections_above = int(k > k_grains), 0
     if grains is not None:
         cut = (slabs.cut_out > grains.cut_out) & ~empty
@@ -334,11 +273,11 @@ def at_most_the_grains(
     return replace(whole, k=min(k, k_grains), slabs=slabs), counts
 
 
-def few_throats(slabs: SlabK) -> Iterator[str]:
+def few_throats(flows: Sequence[Flow]) -> Iterator[str]:
     """A warning on the sections whose flow few throats carry; none without any."""
     few = [
-        f"{int(flow.carrying_throats)} in section {number + 1}"
-        for number, flow in enumerate(slabs.flows)
+        f"{int(flow.carrying_throats)} in section {number}"
+        for number, flow in enumerate(flows, start=1)
         if 0.0 < flow.carrying_throats < FEW_THROATS
     ]
     if few:
@@ -356,51 +295,54 @@ def few_throats(slabs: SlabK) -> Iterator[str]:
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class Measured:
-    """A specimen and what has been computed of it so far."""
+    """A specimen, what has been computed of it so far, and the log of the present pair."""
 
     specimen: Specimen
-    sides: Sides
-    _first: dict[str, tuple[State, SlabK]] = field(default_factory=dict)
-    _final: dict[str, State] = field(default_factory=dict)
-    _cut: dict[bool, CutNetworks] = field(default_factory=dict)
-    _all: AllSpheres | None = None
-    _damaged: dict[tuple[str, str], tuple[State, Damage | None]] = field(default_factory=dict)
+    log: Log
+    _kept: dict[tuple[object, ...], Any] = field(default_factory=dict)
 
     __repr__ = one_line
 
-    def clean(self, law: str, log: Log) -> tuple[State, SlabK]:
-        """The first grains without fines by a conductance law, and its sections."""
-        if law not in self._first:
-            state = clean_state(self.specimen.first, law, log)
-            cut = self._own_slabs(law, log, final=False)
-            slabs = state_slabs(state, self.specimen.edges, log, cut=cut, conduct=LAWS[law])
-            self._first[law] = state, slabs
-        return self._first[law]
+    def _once(self, make: Callable[[], Any], *key: object) -> Any:
+        if key not in self._kept:
+            self._kept[key] = make()
+        return self._kept[key]
 
-    def base(self, law: str, log: Log) -> State:
+    def clean(self, law: str) -> State:
+        """The first grains without fines by a conductance law, with their sections."""
+
+        def make() -> State:
+            state = clean_state(self.specimen.first, law, self.log)
+            return self._with_slabs(state, law, LAWS[law], final=False)
+
+        state: State = self._once(make, "clean", law)
+        return state
+
+    def base(self, law: str) -> State:
         """The grains where they ended, without fines."""
         if not self.specimen.moved:
-            return self.clean(law, log)[0]
-        if law not in self._final:
-            self._final[law] = clean_state(self.specimen.network, law, log)
-        return self._final[law]
+            return self.clean(law)
+        state: State = self._once(
+            lambda: clean_state(self.specimen.network, law, self.log), "base", law
+        )
+        return state
 
-    def damaged(
-        self, choices: AnalysisChoices, name: str, log: Log
-    ) -> tuple[State, Damage | None]:
+    def damaged(self, choices: AnalysisChoices, name: str) -> tuple[State, Damage | None]:
         """The grains with fines by the damage law `name` of the network of the grains."""
-        base, occupancy = self.base(choices.law, log), self.specimen.occupancy
+        base, occupancy = self.base(choices.law), self.specimen.occupancy
         if occupancy is None:
             return base, None
-        if (choices.law, name) not in self._damaged:
-            with log.timed("conductance"):
-                damage = _law(choices, name)(base.network, occupancy, base.conductance)
-            state = make_state(base.network, damage.conductance, log, halves=base.halves)
-            self._damaged[choices.law, name] = state, damage
-        return self._damaged[choices.law, name]
 
-    def damaged_slabs(self, state: State, choices: AnalysisChoices, name: str, log: Log) -> SlabK:
-        """The sections of `damaged`; their own networks hold their own part of the fines."""
+        def make() -> tuple[State, Damage]:
+            with self.log.timed("conductance"):
+                damage = _law(choices, name)(base.network, occupancy, base.conductance)
+            return make_state(base.network, damage.conductance, base.halves, self.log), damage
+
+        state, damage = self._once(make, choices.law, name)
+        return state, damage
+
+    def with_fines_slabs(self, state: State, choices: AnalysisChoices, name: str) -> State:
+        """A `damaged` state with its sections, whose networks hold their own part of the fines."""
         fines = self.specimen.fines
 
         def conduct(network: Network) -> Array:
@@ -409,54 +351,58 @@ class Measured:
             occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
             return _law(choices, name)(network, occupancy, clean).conductance
 
-        cut = self._own_slabs(choices.law, log, final=True)
-        return state_slabs(state, self.specimen.edges, log, cut=cut, conduct=conduct)
+        return self._with_slabs(state, choices.law, conduct, final=True)
 
-    def all_spheres(self, choices: AnalysisChoices, log: Log) -> AllSpheres | None:
+    def all_spheres(self, choices: AnalysisChoices) -> State | None:
         """The network of grains and fines where the damage law asks for it, else None.
 
         "auto" asks for it up to `MOST_SPHERES` grains and fines, and goes without it, with a
         warning, where these make no network. Raises NetworkError and FlowError as
-        `measure_all_spheres` does where "all-spheres" asks for it.
+        `all_spheres_state` does where "all-spheres" asks for it.
         """
-        fines, name = self.specimen.fines, choices.damage_law
+        specimen, fines, name = self.specimen, self.specimen.fines, choices.damage_law
         if fines is None or not len(fines) or name not in (AUTO, ALL_SPHERES):
             return None
-        count = len(fines) + len(self.specimen.grains[1])
+        grains = specimen.grains[1]
+        count = len(fines) + len(grains)
         if name == AUTO and (choices.law != DEFAULT_LAW or count > MOST_SPHERES):
             return None
+
+        def make() -> State:
+            together = grains.joined(fines)
+            return all_spheres_state(together, specimen.edges, specimen.first, self.log)
+
         try:
-            if self._all is None:
-                together, edges = self.specimen.grains[1].joined(fines), self.specimen.edges
-                self._all = measure_all_spheres(together, edges, sides=self.sides, log=log)
+            state: State = self._once(make, "all-spheres")
+            return state
         except (NetworkError, FlowError) as error:
             if name == ALL_SPHERES:
                 raise
-            log.warnings.append(
+            self.log.warnings.append(
                 Doubt("other-damage-law", f"the damage law {SECTION_ARCHIE} was taken: {error}")
             )
-        return self._all
+        return None
 
-    def _own_slabs(self, law: str, log: Log, *, final: bool) -> CutNetworks | None:
-        """The networks of the sections for the law `lubrication`; None for other laws.
+    def _with_slabs(self, state: State, law: str, conduct: Conduct, *, final: bool) -> State:
+        """The state with its sections, by their own networks for the law `lubrication`.
 
         The other laws cut the throats of the whole network, as the thesis does, and one section
         of a box with an inlet and an outlet is the whole.
         """
-        edges = self.specimen.edges
-        if law != DEFAULT_LAW or (len(edges) == 2 and not self.sides.periodic[0]):
-            return None
-        final = final and self.specimen.moved
-        if final not in self._cut:
-            with log.timed("tessellate"):
-                self._cut[final] = cut_networks(self.specimen.grains[final], edges, self.sides)
-            log.warnings += self._cut[final].refused
-        return self._cut[final]
+        specimen, edges, cut = self.specimen, self.specimen.edges, None
+        if law == DEFAULT_LAW and (len(edges) > 2 or specimen.first.periodic[0]):
+            final = final and specimen.moved
+
+            def make() -> Cut:
+                with self.log.timed("tessellate"):
+                    networks = cut_networks(specimen.grains[final], edges, specimen.first)
+                self.log.warnings += refused_slabs(networks)
+                return networks
+
+            cut = self._once(make, "cut", final)
+        return with_slabs(state, edges, cut, conduct, self.log)
 
 
 def _law(choices: AnalysisChoices, name: str) -> DamageLaw:
-    return damage_law(
-        name,
-        clogging_threshold=choices.clogging_threshold,
-        middle_band=choices.middle_band,
-    )
+    threshold, band = choices.clogging_threshold, choices.middle_band
+    return damage_law(name, clogging_threshold=threshold, middle_band=band)

@@ -14,7 +14,7 @@ from fdnet.names import ALL_SPHERES, DEFAULT_LAW, SECTION_ARCHIE
 
 
 @contextmanager
-def compiling(sides: str, *, wanted: bool) -> Iterator[Callable[[], None]]:
+def compiling(sides: str, *, wanted: bool) -> Iterator[Callable[[], object]]:
     """Compile meanwhile for packs with these periodic `sides`; call what it yields to wait.
 
     Nothing is started where it is not `wanted`, or where this version has compiled something.
@@ -28,13 +28,8 @@ def compiling(sides: str, *, wanted: bool) -> Iterator[Callable[[], None]]:
     command = [sys.executable, "-P", "-m", "fdnet.network.warm_up", sides]
     quiet = subprocess.DEVNULL
     with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) as process:
-
-        def wait() -> None:
-            """Wait for its end; the analysis compiles what is left."""
-            process.wait()
-
         try:
-            yield wait
+            yield process.wait  # the analysis compiles what is left
         finally:
             process.terminate()
 
@@ -50,13 +45,11 @@ def warm_up(sides: str) -> None:
     places = 5e-4 * (np.indices((5, 5, 5)).reshape(3, -1).T + 0.5)
     places = places + draw.uniform(-2e-5, 2e-5, places.shape)
     small = draw.uniform(0.0, 2.5e-3, (60, 3))
-    far = np.linalg.norm(small[:, None] - places, axis=2).min(axis=1) > 2.8e-4
-    small = small[far]
+    small = small[np.linalg.norm(small[:, None] - places, axis=2).min(axis=1) > 2.8e-4]
     radii = np.concatenate([draw.uniform(2.3e-4, 2.5e-4, len(places)), np.full(len(small), 4e-5)])
     kinds = ["grain"] * len(places) + ["fine"] * len(small)
-    spheres = Snapshot.from_arrays(
-        np.concatenate([places, small]), radii, box=[[0.0, 2.5e-3]] * 3, kind=kinds
-    )
+    place, box = np.concatenate([places, small]), [[0.0, 2.5e-3]] * 3
+    spheres = Snapshot.from_arrays(place, radii, box=box, kind=kinds)
     pairs = [(DEFAULT_LAW, ALL_SPHERES), (DEFAULT_LAW, SECTION_ARCHIE)]
     for _ in compare(spheres, periodic=sides, sections=2, laws=pairs):
         pass

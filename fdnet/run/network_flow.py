@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fdnet.classes.beside_spheres import Narrowed
-from fdnet.network import geometry
 from fdnet.network.field.field import VelocityField, velocity_field
 from fdnet.network.fines.deposit import (
+    Deposit,
     Holders,
-    KeptDeposit,
     holders_of,
     measured_deposit,
     reaching_inside,
@@ -45,12 +44,12 @@ class Pressed(NamedTuple):
     groups: Array  # (G, 3) on the fines in each pore; pores of one group are one
 
 
-def on_each_fine(pressed: Pressed, deposit: KeptDeposit) -> Array:
+def on_each_fine(pressed: Pressed, deposit: Deposit) -> Array:
     """Force (N, 3) m2 on each fine of a deposit: what its pores feel, by its share of the fines.
 
     A pore without fines leaves its force to nobody; so does one whose fines left since the solve.
     """
-    group = deposit.holders.network.pore_group[deposit.pore]
+    group = deposit.network.pore_group[deposit.pore]
     held = np.bincount(group, deposit.volume, len(pressed.groups))
     force = pressed.groups[group] * (deposit.volume / held[group])[:, None]
     return _summed(deposit.fine, force, len(deposit.fines))
@@ -211,7 +210,7 @@ def pack_flow(grains: Snapshot, periodic: tuple[bool, bool, bool], walls: str) -
     middle[:, 1] += network.throat_shift * np.ptp(network.box, axis=1)
     forth = np.sum((middle[:, 1] - middle[:, 0]) * normal, axis=1)
     turned = np.where(forth < 0, -network.throat_share, network.throat_share)
-    whole = geometry.triangle_area(corner)[:, None]
+    whole = np.linalg.norm(normal, axis=1)[:, None]
     return PackFlow(
         network=network,
         clean=clean,
@@ -257,14 +256,13 @@ class Renewal:
     # share of the deposit that may change before the network is solved anew
     renewed: float = RENEWED
     solved: Snapshot | None = None  # the fines of the last solve; None before the first
-    deposit: KeptDeposit | None = None  # the fines as they are measured
     sections: KeptSections | None = None  # of the throats, as they were at the last solve
     carried: Carried | None = None  # what the last solve gave
     solves: int = 0  # number of solves
 
     def of(
         self, fines: Snapshot, *, anew: bool, finer: Finer | None = None
-    ) -> tuple[Carried, KeptDeposit]:
+    ) -> tuple[Carried, Deposit]:
         """What the pores carry with standing `fines`, which are `placed`.
 
         The network is solved when enough of them changed, and where `anew` asks. What a solve
@@ -272,10 +270,7 @@ class Renewal:
         fines leave.
         """
         inside, pack = fines.where(reaching_inside(self.pack.network, fines)), self.pack
-        if self.deposit is None:
-            self.deposit = measured_deposit(pack.holders, inside)
-        else:
-            self.deposit = self.deposit.changed_to(inside)
+        deposit = measured_deposit(pack.holders, inside)
         if anew or self.carried is None or changed_share(self.solved, inside) > self.renewed:
             self.sections = pack.sections(inside, self.sections)
             self.carried, self.solved = None, inside
@@ -283,12 +278,12 @@ class Renewal:
         kept = self.sections.factor
         volume = None
         if finer is not None:
-            kept, volume, grown = finer(kept, self.deposit.in_pores)
+            kept, volume, grown = finer(kept, deposit.in_pores)
             self.carried = None if grown else self.carried
         if self.carried is None:
-            self.carried = pack.carried(kept, self.deposit.in_pores, volume)
+            self.carried = pack.carried(kept, deposit.in_pores, volume)
             self.solves += 1
-        return self.carried, self.deposit
+        return self.carried, deposit
 
 
 def placed(fines: Snapshot) -> Snapshot:

@@ -43,13 +43,13 @@ def test_plane_walls_without_a_grain_give_the_parabola_of_poiseuille():
     """Mean 1 and pressure gradient 12 / H^2; this scheme's own error is 2 / n^2."""
     box = np.array([[0.0, 2.0], [0.0, 1.0], [0.0, 2.0]])
     lattice = build_lattice(box, (True, False, True), spacing=0.05, upstream=0.0, downstream=0.0)
-    none = (np.zeros((0, 3)), np.zeros(0))
+    none = pack().where(np.zeros(16, bool))
     flow, y = solved_field(lattice, none, none, 1e-5), np.linspace(0.002, 0.998, 100)
     u = flow.at(np.column_stack([np.full(100, 0.7), y, np.full(100, 1.1)]))
     assert u[:, 0] == pytest.approx(6.0 * y * (1.0 - y), abs=0.02)
     assert np.abs(u[:, 1:]).max() < 1e-5
     assert flow.resistance == pytest.approx(2.0 * 12.0 / (1.0 + 2.0 / 20**2), rel=1e-5)
-    assert flow.wall_force[0] == pytest.approx(2.0 * flow.resistance, rel=1e-9)
+    assert flow.forces[1][0] == pytest.approx(2.0 * flow.resistance, rel=1e-9)
 
 
 def test_the_flow_keeps_its_volume_passes_every_section_and_stands_still_in_grains():
@@ -71,7 +71,7 @@ def test_forces_add_up_to_the_pressure_drop_times_the_area():
     size, (y, z) = np.ptp(pack().box, axis=1), np.indices((30, 30)).reshape(2, -1) + 0.5
     for periodic in ("xyz", "yz", ""):
         current = field(periodic)
-        total = current.grain_force.sum(axis=0) + current.wall_force
+        total = sum(np.sum(np.atleast_2d(part), axis=0) for part in current.forces)
         area = size[1] * size[2]
         assert total[0] == pytest.approx(current.resistance * area, rel=1e-9), periodic
         if periodic != "xyz":
@@ -121,14 +121,13 @@ def test_fines_turn_the_flow_and_those_off_the_grid_are_left_out():
     new = fdnet.velocity_field(pack(), periodic="xyz", fines=fines, cells=6.0, tolerance=0.005)
     assert new.k < 0.9 * field("xyz").k
     assert np.all(new.at(place) == 0.0)
-    total = new.grain_force.sum(axis=0) + new.fine_force.sum(axis=0)
+    total = new.forces[0].sum(axis=0)
     area = np.prod(np.ptp(pack().box, axis=1)[1:])
     assert total[0] == pytest.approx(new.resistance * area, rel=1e-9)
-    far = [[-30.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
+    far = [[30.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
     both = Snapshot.from_arrays(far, 0.2, box=pack().box, kind="fine")
-    current = fdnet.velocity_field(pack(), periodic="yz", fines=both, cells=6.0, upstream=2.0)
-    assert current.inside.tolist() == [False, True]
-    assert np.all(current.fine_force[0] == 0.0)
+    current = fdnet.velocity_field(pack(), periodic="yz", fines=both, cells=6.0)
+    assert current.position[current.grains :].tolist() == far[1:]
 
 
 def test_bad_points_packs_and_cells_are_refused():

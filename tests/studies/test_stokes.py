@@ -82,14 +82,10 @@ def test_a_direct_solve_gives_the_same_tensor():
     grid = replace(HALF, spacing=edges / shape, shape=shape, specimen=(0.0, 1.0), planes=False)
     walls = [find_walls(grid, d, pack.position, pack.radius) for d in range(3)]
     tensor = direct_tensor(shape, [(wall.node, wall.slack) for wall in walls]) * grid.unit**2
-    for axis in range(3):
-        free, held = (
-            solve_stokes(pack, cells=10, axis=axis, tolerance=1e-6, transverse=way).k
-            for way in (True, False)
-        )
-        assert free == pytest.approx(tensor[axis, axis], rel=1e-4)
-        assert held == pytest.approx(1.0 / np.linalg.inv(tensor)[axis, axis], rel=1e-4)
-        assert held < free * (1.0 - 1e-3)
+    for axis in "xyz":
+        k = solve_stokes(pack.turned(axis), cells=10, tolerance=1e-6).k
+        d = "xyz".index(axis)
+        assert k == pytest.approx(tensor[d, d], rel=1e-4)
 
 
 def whole(node, shape, component):
@@ -130,7 +126,7 @@ def test_turning_scaling_tiling_and_shifting_by_a_cell_change_nothing():
     two = cell(np.vstack([place, np.add(place, [0, 1, 0])]), np.tile(radius, 2), (1, 2, 1))
     k = solve_stokes(cell(place, radius), cells=20).k
     others = [
-        solve_stokes(cell(place[:, [1, 2, 0]], radius), cells=20, axis=2).k,
+        solve_stokes(cell(place[:, [1, 2, 0]], radius).turned("z"), cells=20).k,
         1e6 * solve_stokes(cell(1e-3 * place, 1e-3 * radius, (1e-3,) * 3), cells=20).k,
         solve_stokes(two, cells=40).k,
         solve_stokes(cell(np.add(place, [0.05, 0.1, -0.15]), radius), cells=20).k,

@@ -15,11 +15,13 @@ from scipy import fft
 
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network.field.sampled import (
-    Gradient,
-    Sampled,
-    find_gradient,
+    Nearby,
+    Parts,
     find_nearby,
-    sample_velocity,
+    gradient_at,
+    gradient_parts,
+    smooth_parts,
+    velocity_at,
 )
 from fdnet.network.stokes import FEWEST_CELLS, GridFlow, Lattice, Walled, solve
 from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, sides_of
@@ -31,21 +33,21 @@ class VelocityField:
     superficial velocity U along x.
 
     Attributes:
-        grains: centres (G, 3) m and radii (G,) m of the grains that hold the fluid.
-        fines: centres (N, 3) m and radii (N,) m of the fines that hold the fluid.
+        position: (N, 3) m, centres of the spheres on the grid: first the grains, then the fines.
+        radius: (N,) m, of these spheres.
+        grains: number of grains among them.
         solved: the flow on the grid.
-        inside: (N,) which of the fines given are on the grid; the others are left out.
     """
 
-    grains: tuple[Array, Array]
-    fines: tuple[Array, Array]
+    position: Array
+    radius: Array
+    grains: int
     solved: GridFlow
-    inside: Array
 
     def __repr__(self) -> str:
         shape = " x ".join(map(str, self.lattice.shape))
         return (
-            f"VelocityField({len(self.grains[1])} grains, {len(self.fines[1])} fines, "
+            f"VelocityField({self.grains} grains, {len(self.radius) - self.grains} fines, "
             f"{shape} cells, k {self.k:.4g} m2)"
         )
 
@@ -58,33 +60,14 @@ class VelocityField:
     def resistance(self) -> float:
         """Pressure drop over the specimen over mu U, 1/m; clear fluid around it adds nothing."""
         edges = self.lattice.spacing * self.lattice.shape
-        force = float(self._forces[0][:, 0].sum() + self.wall_force[0])
+        on_spheres, on_walls = self.forces
+        force = float(on_spheres[:, 0].sum() + on_walls[0])
         return force / (float(np.prod(edges)) / float(edges[0]))
 
     @property
     def k(self) -> float:
         """Permeability of the specimen on this grid, m2; it is too high on a coarse one."""
         return (self.lattice.specimen[1] - self.lattice.specimen[0]) / self.resistance
-
-    @property
-    def grain_force(self) -> Array:
-        """Force of the fluid on each grain over mu U, (G, 3) m, the pressure gradient included."""
-        return self._forces[0][: len(self.grains[1])]
-
-    @property
-    def fine_force(self) -> Array:
-        """Force of the fluid on each fine given over mu U, (N, 3) m, likewise; 0 off the grid.
-
-        The forces on grains, fines and side walls add up to the pressure drop times the area.
-        """
-        force = np.zeros((len(self.inside), 3))
-        force[self.inside] = self._forces[0][len(self.grains[1]) :]
-        return force
-
-    @property
-    def wall_force(self) -> Array:
-        """Force of the fluid on the side walls over mu U, (3,) m."""
-        return self._forces[1]
 
     def at(self, points: Any) -> Array:
         """Fluid velocity over U, (N, 3), at points (N, 3) m.
@@ -95,7 +78,7 @@ class VelocityField:
         Raises:
             CaseError: the points are not (N, 3) finite numbers.
         """
-        return self._sampled.velocity(_checked(points))
+        return velocity_at(self.lattice, *self._smooth, _checked(points))
 
     def pressure_gradient_at(self, points: Any) -> Array:
         """Gradient of the pressure over mu U, (N, 3) 1/m2, at points (N, 3) m.
@@ -105,30 +88,28 @@ class VelocityField:
         Raises:
             CaseError: the points are not (N, 3) finite numbers.
         """
-        return self._gradient.at(_checked(points))
+        return gradient_at(self.lattice, self._gradient, _checked(points))
 
     @cached_property
-    def _forces(self) -> tuple[Array, Array]:
-        return self.solved.forces(len(self.grains[1]) + len(self.fines[1]))
+    def forces(self) -> tuple[Array, Array]:
+        """Forces of the fluid on each sphere (N, 3) and on the side walls (3,), over mu U, m.
+
+        They include the pressure gradient, and add up to the pressure drop times the area.
+        """
+        return self.solved.forces(len(self.radius))
 
     @cached_property
-    def _flow(self) -> list[Array]:
+    def _smooth(self) -> tuple[Nearby, Parts]:
         flow = self.lattice.response.velocity(list(self.solved.force))
-        return [
-            part + np.float32(drift) for part, drift in zip(flow, self.solved.drift, strict=True)
-        ]
+        for part, drift in zip(flow, self.solved.drift, strict=True):
+            part += np.float32(drift)
+        nearby = find_nearby(self.lattice, self.position, self.radius)
+        return nearby, smooth_parts(self.lattice, nearby, flow)
 
     @cached_property
-    def _sampled(self) -> Sampled:
-        position, radius = map(np.concatenate, zip(self.grains, self.fines, strict=True))
-        return sample_velocity(
-            self.lattice, find_nearby(self.lattice, position, radius), self._flow
-        )
-
-    @cached_property
-    def _gradient(self) -> Gradient:
+    def _gradient(self) -> Parts:
         mean = -self.resistance / float(self.lattice.spacing[0] * self.lattice.shape[0])
-        return find_gradient(self.solved, self.lattice.response, mean)
+        return gradient_parts(self.solved, mean)
 
 
 def _checked(points: Any) -> Array:
@@ -162,14 +143,14 @@ def velocity_field(
     periodic: Directions | None = None,
     fines: Snapshot | None = None,
     cells: float | None = None,
-    upstream: float | None = None,
     tolerance: float = SLIP_LEFT,
 ) -> VelocityField:
     """The velocity of a slow fluid in the pores of a pack, over the superficial one along x.
 
     Stokes flow is solved on a grid of `cells` cells across a mean grain. Fines are resolved as the
     grains are. The sides y and z that are not periodic are walls that hold the fluid. A specimen
-    that is not periodic along x has clear fluid before and beyond it, which moves evenly.
+    that is not periodic along x has clear fluid before and beyond it, which moves evenly: a grain
+    diameter more than the fines reach upstream, and half of one downstream.
 
     Args:
         grains: the skeleton, m; `box` is the specimen. Fines among them are the deposit where
@@ -178,8 +159,6 @@ def velocity_field(
             without it those that the file of the grains gives, else none.
         fines: the deposit; its spheres of kind grain are ignored where it has any of kind fine.
         cells: across a mean grain diameter; without it 10 to 18, as a million cells allow.
-        upstream: m of grid before the specimen; without it, a grain diameter more than the fines
-            reach. Without meaning where x is periodic.
         tolerance: rms velocity over the superficial one that may be left at the walls.
 
     Raises:
@@ -207,25 +186,18 @@ def velocity_field(
         # all of them where none is of kind fine
         deposit = fines.fines() if len(fines.fines()) else fines
     diameter, sides = 2.0 * float(skeleton.radius.mean()), sides_of(grains, periodic)
-    if upstream is None:
-        reach = grains.box[0, 0] - (deposit.position[:, 0] - deposit.radius)
-        upstream = UPSTREAM * diameter + float(max(0.0, reach.max(initial=0.0)))
+    reach = grains.box[0, 0] - (deposit.position[:, 0] - deposit.radius)
+    upstream = UPSTREAM * diameter + float(max(0.0, reach.max(initial=0.0)))
+    downstream = DOWNSTREAM * diameter
     if cells is None:
         edges = np.ptp(grains.box, axis=1)
-        edges[0] += 0.0 if sides[0] else upstream + DOWNSTREAM * diameter
+        edges[0] += 0.0 if sides[0] else upstream + downstream
         affordable = diameter * (AFFORDED / np.prod(edges)) ** (1.0 / 3.0)
         cells = float(np.clip(affordable, COARSEST, FINEST))
     lattice = build_lattice(
-        grains.box,
-        sides,
-        spacing=diameter / cells,
-        upstream=upstream,
-        downstream=DOWNSTREAM * diameter,
+        grains.box, sides, spacing=diameter / cells, upstream=upstream, downstream=downstream
     )
-    kept = skeleton.where(on_grid(lattice, skeleton.position, skeleton.radius))
-    return solved_field(
-        lattice, (kept.position, kept.radius), (deposit.position, deposit.radius), tolerance
-    )
+    return solved_field(lattice, skeleton, deposit, tolerance)
 
 
 def build_lattice(
@@ -273,26 +245,21 @@ def build_lattice(
     )
 
 
-def on_grid(lattice: Lattice, position: Array, radius: Array) -> Array:
-    """True (N,) for spheres that lie wholly between the ends of the grid along x."""
-    low, high = lattice.low[0], lattice.high[0]
-    inside = (position[:, 0] - radius >= low) & (position[:, 0] + radius <= high)
-    return np.asarray(lattice.repeats | inside)
-
-
 def solved_field(
-    lattice: Lattice,
-    grains: tuple[Array, Array],
-    deposit: tuple[Array, Array],
-    tolerance: float,
+    lattice: Lattice, grains: Snapshot, deposit: Snapshot, tolerance: float
 ) -> VelocityField:
-    """The field around grains on the grid and a deposit: centres (N, 3) m and radii (N,) m."""
-    inside = on_grid(lattice, *deposit)
-    fines = frozen(deposit[0][inside]), frozen(deposit[1][inside])
-    position, radius = map(np.concatenate, zip(grains, fines, strict=True))
+    """The field around the grains and the deposit that lie wholly between the ends of the grid."""
+    low, high = lattice.low[0], lattice.high[0]
+    kept = []
+    for one in (grains, deposit):
+        x = one.position[:, 0]
+        inside = (x - one.radius >= low) & (x + one.radius <= high)
+        kept.append(one.where(lattice.repeats | inside))
+    position = np.concatenate([one.position for one in kept])
+    radius = np.concatenate([one.radius for one in kept])
     return VelocityField(
-        grains=grains,
-        fines=fines,
+        position=frozen(position),
+        radius=frozen(radius),
+        grains=len(kept[0]),
         solved=solve(lattice, position, radius, slip=tolerance),
-        inside=frozen(inside),
     )

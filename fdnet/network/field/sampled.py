@@ -8,15 +8,14 @@ the mean of their neighbours; in the solid, without its part across the wall. Le
 spacing along x, from the lower corner of the grid.
 """
 
-from dataclasses import dataclass
 from math import ceil, cos, floor, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from fdnet.network.compiled import compiled
-from fdnet.network.stokes import GridFlow, Lattice, Response
-from fdnet.spheres.snapshot import Array, one_line
+from fdnet.network.stokes import GridFlow, Lattice
+from fdnet.spheres.snapshot import Array
 
 WALL_REACH = 2.0
 """R, distance from which a wall no longer shapes the profile, in spacings."""
@@ -199,41 +198,36 @@ def _unbalanced(
 
 
 @compiled
+def _on_axis(at: float, axis: int, grid: CellFrame) -> float:
+    """A place along an axis, brought into the grid where that repeats."""
+    length = grid.shape[axis] * grid.step[axis]
+    return at - floor(at / length) * length if grid.wraps[axis] else at
+
+
+@compiled
 def _place_on(point: Place, grid: CellFrame) -> tuple[Place, int]:
     """The point within the grid, and its cell; -1 - axis for a point outside along an axis."""
     shape, step, wraps = grid
+    place = _on_axis(point[0], 0, grid), _on_axis(point[1], 1, grid), _on_axis(point[2], 2, grid)
     number, out = 0, 0
-    x, y, z = point
     for axis in range(3):
-        length = shape[axis] * step[axis]
-        at = x if axis == 0 else (y if axis == 1 else z)
-        if wraps[axis]:
-            at -= floor(at / length) * length
-        elif at < 0.0 or at >= length:
+        at = place[axis]
+        if not wraps[axis] and (at < 0.0 or at >= shape[axis] * step[axis]):
             out = -1 - axis
-        if axis == 0:
-            x = at
-        elif axis == 1:
-            y = at
-        else:
-            z = at
         number = number * shape[axis] + max(0, min(int(at / step[axis]), shape[axis] - 1))
-    return (x, y, z), out if out < 0 else number
+    return place, out if out < 0 else number
 
 
 @compiled
 def _spreading(
     point: Place,
-    around: tuple[Place, float, float],
+    normal: Place,
+    radius: float,
     grid: CellFrame,
     nearby: Nearby,
     smooth: Parts,
 ) -> float:
-    """Divergence along a sphere of the velocity along it, at one distance from it.
-
-    `around` are the normal, the radius from the centre, and the length of the steps.
-    """
-    normal, radius, step = around
+    """Divergence along a sphere of the velocity along it, at `radius` from its centre."""
     p, q, r = normal
     # two tangents: the normal crossed with the axis that it is farthest from, and with that
     if abs(p) <= abs(q) and abs(p) <= abs(r):
@@ -244,7 +238,7 @@ def _spreading(
         a, b, c = q, -p, 0.0
     length = sqrt(a * a + b * b + c * c)
     a, b, c = a / length, b / length, c / length
-    turn = step / radius
+    turn = ALONG / radius
     cosine, sine = cos(turn), sin(turn)
     total = 0.0
     for tangent in range(2):
@@ -268,11 +262,11 @@ def _spreading(
                 + flow[1] * (cosine * b + across * q)
                 + flow[2] * (cosine * c + across * r)
             )
-    return total / (2.0 * step)
+    return total / (2.0 * ALONG)
 
 
 @compiled
-def sample_points(
+def _sample_velocity(
     point: Array, grid: CellFrame, nearby: Nearby, smooth: Parts, result: Array
 ) -> None:
     """Writes the velocity at each `point` (N, 3), in spacings, to `result`."""
@@ -286,47 +280,32 @@ def sample_points(
             p, q, r = normal
             sampled = u * p + v * q + w * r
             radius = near.least + nearby.place[near.row, 3]
-            spread = _spreading(inside, (normal, radius, ALONG), grid, nearby, smooth)
+            spread = _spreading(inside, normal, radius, grid, nearby, smooth)
             depth = near.least * (WALL_REACH - near.least / 3.0) / (2.0 * WALL_REACH - near.least)
             across = -depth * spread - sampled
             u, v, w = u + across * p, v + across * q, w + across * r
         result[s, 0], result[s, 1], result[s, 2] = u, v, w
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Sampled:
-    """What is interpolated.
+def velocity_at(lattice: Lattice, nearby: Nearby, smooth: Parts, points: Array) -> Array:
+    """Velocity (N, 3) at points (N, 3) m, from the `smooth_parts` of a grid.
 
-    Attributes:
-        lattice: the grid.
-        nearby: the walls near each of its cells.
-        smooth: for each component (n0 + 4, n1 + 4, n2 + 4) velocity / phi; two nodes are added
-            before and two after those of the grid.
+    It is 0 in the solid and outside of walls, and (1, 0, 0) before and beyond the grid along x
+    where that does not repeat.
     """
-
-    lattice: Lattice
-    nearby: Nearby
-    smooth: Parts
-
-    __repr__ = one_line
-
-    def velocity(self, points: Array) -> Array:
-        """Velocity (N, 3) at points (N, 3) m.
-
-        It is 0 in the solid and outside of walls, and (1, 0, 0) before and beyond the grid along
-        x where that does not repeat.
-        """
-        lattice = self.lattice
-        wraps = np.array([lattice.repeats, not lattice.walled[1], not lattice.walled[2]])
-        frame = CellFrame(np.array(lattice.shape), lattice.spacing / lattice.unit, wraps)
-        result = np.zeros(points.shape)
-        place = np.ascontiguousarray((points - lattice.low) / lattice.unit)
-        sample_points(place, frame, self.nearby, self.smooth, result)
-        return result
+    wraps = np.array([lattice.repeats, not lattice.walled[1], not lattice.walled[2]])
+    frame = CellFrame(np.array(lattice.shape), lattice.spacing / lattice.unit, wraps)
+    result = np.zeros(points.shape)
+    place = np.ascontiguousarray((points - lattice.low) / lattice.unit)
+    _sample_velocity(place, frame, nearby, smooth, result)
+    return result
 
 
-def sample_velocity(lattice: Lattice, nearby: Nearby, flow: list[Array]) -> Sampled:
-    """Prepares the interpolation of a velocity, three arrays of the grid's shape."""
+def smooth_parts(lattice: Lattice, nearby: Nearby, flow: list[Array]) -> Parts:
+    """Velocity / phi (n0 + 4, n1 + 4, n2 + 4) of each component of a `flow` (n0, n1, n2).
+
+    Two nodes are added before and two after those of the grid.
+    """
     step = lattice.spacing / lattice.unit
     smooth = []
     for d, part in enumerate(flow):
@@ -342,7 +321,7 @@ def sample_velocity(lattice: Lattice, nearby: Nearby, flow: list[Array]) -> Samp
             # no flow through the walls: their own nodes carry nothing
             across = np.moveaxis(bounded[d], d, 0)
             across[:3], across[lattice.shape[d] + 2 :] = 0.0, 0.0
-    return Sampled(lattice=lattice, nearby=nearby, smooth=(bounded[0], bounded[1], bounded[2]))
+    return bounded[0], bounded[1], bounded[2]
 
 
 def _padded(part: Array, lattice: Lattice, component: int) -> Array:
@@ -419,45 +398,34 @@ def _turn_along_walls(
                 sphere = nearby.place[near.row]
                 p, q, r = node[0] - sphere[0], node[1] - sphere[1], node[2] - sphere[2]
                 u, v, w = _interpolated(smooth, x, y, z)
-                own = p if component == 0 else (q if component == 1 else r)
+                own = (p, q, r)[component]
                 part[i, j, k] -= own * (u * p + v * q + w * r) / (p * p + q * q + r * r)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Gradient:
-    """The pressure gradient on the faces of the cells.
+def gradient_at(lattice: Lattice, parts: Parts, points: Array) -> Array:
+    """Pressure gradient (N, 3) 1/m2 at points (N, 3) m, linear between the faces of the cells.
 
-    Attributes:
-        lattice: the grid.
-        parts: for each component (n0, n1, n2) difference across the face over its spacing, over
-            viscosity and superficial velocity, 1/m2. Faces in the solid carry the mean of their
-            neighbours in the fluid, from the surface inwards.
+    It is 0 before and beyond a grid that does not repeat along x. `parts` are `gradient_parts`.
     """
-
-    lattice: Lattice
-    parts: Parts
-
-    __repr__ = one_line
-
-    def at(self, points: Array) -> Array:
-        """Gradient (N, 3) 1/m2 at points (N, 3) m, linear between the faces.
-
-        It is 0 before and beyond a grid that does not repeat along x.
-        """
-        result, inside = np.zeros(points.shape), np.ones(len(points), bool)
-        if not self.lattice.repeats:
-            inside = points[:, 0] >= self.lattice.low[0]
-            inside &= points[:, 0] < self.lattice.high[0]
-        place = np.ascontiguousarray((points[inside] - self.lattice.low) / self.lattice.spacing)
-        sampled = np.zeros(place.shape)
-        _sample(place, np.array(self.lattice.walled), self.parts, sampled)
-        result[inside] = sampled
-        return result
+    result, inside = np.zeros(points.shape), np.ones(len(points), bool)
+    if not lattice.repeats:
+        inside = (points[:, 0] >= lattice.low[0]) & (points[:, 0] < lattice.high[0])
+    place = np.ascontiguousarray((points[inside] - lattice.low) / lattice.spacing)
+    sampled = np.zeros(place.shape)
+    _sample(place, np.array(lattice.walled), parts, sampled)
+    result[inside] = sampled
+    return result
 
 
-def find_gradient(flow: GridFlow, response: Response, gradient: float) -> Gradient:
-    """The pressure gradient of a flow whose mean is `gradient` 1/m2 along x."""
-    lattice, pressure = flow.lattice, response.pressure(list(flow.force))
+def gradient_parts(flow: GridFlow, gradient: float) -> Parts:
+    """The pressure gradient of a flow whose mean is `gradient` 1/m2 along x, on the faces.
+
+    For each component (n0, n1, n2) the difference across the face over its spacing, over viscosity
+    and superficial velocity. Faces in the solid carry the mean of their neighbours in the fluid,
+    from the surface inwards.
+    """
+    lattice = flow.lattice
+    pressure = lattice.response.pressure(list(flow.force))
     parts = []
     for axis in range(3):
         step = pressure - np.roll(pressure, 1, axis=axis)
@@ -470,7 +438,7 @@ def find_gradient(flow: GridFlow, response: Response, gradient: float) -> Gradie
         while _fill_layer(part, known):
             pass
         parts.append(part)
-    return Gradient(lattice=lattice, parts=(parts[0], parts[1], parts[2]))
+    return parts[0], parts[1], parts[2]
 
 
 @compiled
@@ -499,7 +467,7 @@ def _fill_layer(part: Array, known: Array) -> int:
 
 
 @compiled
-def _sample(place: Array, walled: Array, parts: tuple[Array, Array, Array], result: Array) -> None:
+def _sample(place: Array, walled: Array, parts: Parts, result: Array) -> None:
     """Writes the linear interpolation at each `place` (N, 3), in cells, to `result`."""
     base, rest, at = np.zeros(3, np.int64), np.zeros(3), np.zeros(3, np.int64)
     for s in range(len(place)):

@@ -4,14 +4,14 @@ The neighbourhood of a fine is a ball about its centre. Grains and walls take sp
 fill that space in part. A fine far from all others has porosity 1, also next to a grain.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from fdnet.network.compiled import compiled, compiled_in_place
 from fdnet.network.fines.deposit import Grid, cells_between, grid_of
 from fdnet.spheres.geometry import make_images, wrapped
-from fdnet.spheres.snapshot import Array, Snapshot, one_line
+from fdnet.spheres.snapshot import Array, Snapshot
 
 REACH = 4.0
 """Radius of the neighbourhood over that of the fine (or over the Sauter mean of all, if that is
@@ -22,8 +22,7 @@ _NODE, _WEIGHT = np.polynomial.legendre.leggauss(4)
 """Gauss and Legendre's rule, exact for the polynomials of degree 7 that are integrated here."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Neighbourhood:
+class Neighbourhood(NamedTuple):
     """What surrounds each fine (N,).
 
     Attributes:
@@ -37,9 +36,6 @@ class Neighbourhood:
     porosity: Array
     size_ratio: Array
     capped: int
-
-    def __repr__(self) -> str:
-        return one_line(self)
 
 
 def local_porosity(
@@ -57,15 +53,12 @@ def local_porosity(
     compressibility of hard spheres: 1 for a lone one, nearly 0 in a dense bed (Wertheim 1963, from
     the equation of Percus and Yevick 1958). So s is 0 for a lone fine, and the bed's own in a bed.
 
-    Args:
-        spheres: grains and fines, m.
-        periodic: across which sides of `spheres.box` there are images; y and z have walls where
-            they are not periodic.
-        reach: radius of the ball in radii.
+    Spheres have images across the sides of `spheres.box` that are `periodic`; y and z have walls
+    where they are not.
     """
     fines = spheres.fines()
     if not len(fines):
-        return Neighbourhood(porosity=np.ones(0), size_ratio=np.ones(0), capped=0)
+        return Neighbourhood(np.ones(0), np.ones(0), 0)
     radius = fines.radius
     ball = reach * np.maximum(radius, float(np.sum(radius**3) / np.sum(radius**2)))
     space = _of_ball(ball, ball) - _behind_walls(fines, ball, periodic)

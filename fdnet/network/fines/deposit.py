@@ -3,7 +3,6 @@
 Points in given boxes, by sorting the points into cubic cells.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from math import atan2, copysign, pi, sqrt
 from typing import NamedTuple
@@ -13,20 +12,16 @@ import numpy as np
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled, compiled_in_place
 from fdnet.network.network import Network
+from fdnet.network.tessellation.delaunay import Vector, along, times
 from fdnet.spheres.geometry import make_images
-from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line, unmoved
+from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line
 
 
 def points_in_boxes(point: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """All pairs of a box and a point in it, in the order of the boxes.
+    """Index (K,) of the box and of the point of all pairs of a box and a point in it.
 
-    Args:
-        point: (N, 3) m.
-        low: (M, 3) m, low corners of the boxes.
-        high: (M, 3) m, high corners; points on the faces of a box are in it.
-
-    Returns:
-        Index of the box (K,) and of the point (K,).
+    They are in the order of the boxes, which reach from `low` to `high` (M, 3) m, the points
+    (N, 3) m on their faces included.
     """
     if not len(point) or not len(low):
         return np.zeros(0, np.intp), np.zeros(0, np.intp)
@@ -53,12 +48,10 @@ class Grid(NamedTuple):
 
 
 def grid_of(point: Array, edge: float | None = None) -> tuple[Grid, Array]:
-    """Points (N, 3) m sorted into cubic cells of `edge` m, with N at least 1.
+    """Cubic cells of `edge` m, and the order (N,) in which they hold the points (N, 3) m.
 
-    Without an edge the cells are as many as the points along the longest side of a cube.
-
-    Returns:
-        The cells, and the order (N,) in which they hold the points.
+    There is at least one point. Without an edge the cells are as many as the points along the
+    longest side of a cube.
     """
     start = point.min(axis=0)
     if edge is None:
@@ -138,11 +131,9 @@ ROUNDING = 1e-13
 OTHERS = np.array([(1, 2, 3), (2, 3, 0), (3, 0, 1), (0, 1, 2)])
 """(4, 3) corners of the facet opposite each corner."""
 
-Vector = tuple[float, float, float]
-
 
 @compiled
-def pieces(corner: Array, pairs: tuple[Array, Array], centre: Array, radius: Array) -> Array:
+def pieces(corner: Array, pore: Array, ball: Array, centre: Array, radius: Array) -> Array:
     """Volume m3 and surface m2 (K, 2) of the piece of a ball in a tetrahedron, pair by pair.
 
     Both are 0 where the two are apart. Pieces below 1e-13 cubes of the radius are rounding and
@@ -150,11 +141,11 @@ def pieces(corner: Array, pairs: tuple[Array, Array], centre: Array, radius: Arr
 
     Args:
         corner: (P, 4, 3) m, corners of the tetrahedra.
-        pairs: index of the tetrahedron and of the ball (K,), which may be apart.
+        pore: (K,) index of the tetrahedron of each pair.
+        ball: (K,) index of the ball, which may be apart from it.
         centre: (N, 3) m, of the balls.
         radius: (N,) m, of the balls.
     """
-    pore, ball = pairs
     normal, place, depth = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(4)
     measured = np.zeros((len(pore), 2))
     last = -1
@@ -165,7 +156,7 @@ def pieces(corner: Array, pairs: tuple[Array, Array], centre: Array, radius: Arr
             last = p
         cuts = np.int64(0)
         for f in range(4):
-            depth[f] = _dot(normal[f], _apart(corner[p, OTHERS[f, 0]], centre[b])) / -radius[b]
+            depth[f] = along(normal[f], _apart(corner[p, OTHERS[f, 0]], centre[b])) / -radius[b]
             cuts += 1 if depth[f] < 1.0 else 0
         if min(min(depth[0], depth[1]), min(depth[2], depth[3])) <= -1.0:
             continue
@@ -184,26 +175,16 @@ def _apart(a: Array, b: Array) -> Vector:
 
 
 @compiled
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@compiled
-def _cross(a: Vector, b: Vector) -> Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@compiled
 def _facet_normals(corner: Array, normal: Array) -> None:
     """Inward unit normals (4, 3) of the facets opposite each corner."""
     turn = 1.0
     for f in range(4):
         a, b, c = corner[OTHERS[f, 0]], corner[OTHERS[f, 1]], corner[OTHERS[f, 2]]
-        across = _cross(_apart(b, a), _apart(c, a))
+        across = times(_apart(b, a), _apart(c, a))
         if f == 0:
             # one sign for all four, so that the facets of a flat tetrahedron face each other
-            turn = copysign(1.0, _dot(_apart(corner[0], a), across))
-        scale = (turn if f % 2 == 0 else -turn) / sqrt(_dot(across, across))
+            turn = copysign(1.0, along(_apart(corner[0], a), across))
+        scale = (turn if f % 2 == 0 else -turn) / sqrt(along(across, across))
         for axis in range(3):
             normal[f, axis] = scale * across[axis]
 
@@ -224,21 +205,17 @@ def _piece(place: Array, normal: Array, depth: Array, cuts: int) -> tuple[float,
     volume, surface = 0.0, 0.0
     for f in range(4):
         for e in range(3):
-            start, end, third = (
-                place[OTHERS[f, e]],
-                place[OTHERS[f, e - 2]],
-                place[OTHERS[f, e - 1]],
-            )
+            corner, start, end = OTHERS[f], place[OTHERS[f, e]], place[OTHERS[f, e - 2]]
             side = _apart(end, start)
-            length = sqrt(_dot(side, side))
+            length = sqrt(along(side, side))
             if length == 0.0:  # shorter than the rounding of places in radii of the ball
                 continue
-            inward = _cross(normal[f], side)
-            height = -_dot(inward, start) / length
-            if _dot(inward, _apart(third, start)) < 0.0:
+            inward = times(normal[f], side)
+            height = -along(inward, start) / length
+            if along(inward, _apart(place[corner[e - 1]], start)) < 0.0:
                 height = -height
             area, shadow = _edge(
-                depth[f], height, _dot(side, start) / length, _dot(side, end) / length
+                depth[f], height, along(side, start) / length, along(side, end) / length
             )
             volume += (shadow + depth[f] * area) / 3.0
             surface += shadow
@@ -288,6 +265,21 @@ def _shadow(
 
 FLAT = 1e-14
 """Volume over the cube of the longest edge, below which a tetrahedron is flat."""
+PARTS = {
+    1: [[(0, 0), (0, 1), (0, 2), (0, 3)]],
+    2: [
+        [(0, 0), (0, 2), (0, 3), (1, 1)],
+        [(0, 2), (0, 3), (1, 1), (1, 2)],
+        [(0, 3), (1, 1), (1, 2), (1, 3)],
+    ],
+    3: [
+        [(0, 0), (1, 1), (2, 2), (0, 3)],
+        [(1, 1), (2, 2), (0, 3), (1, 3)],
+        [(2, 2), (0, 3), (1, 3), (2, 3)],
+    ],
+}
+"""Tetrahedra that make up the part above a plane, by how many corners are above; these come first.
+(i, j) is where the edge from corner i to j meets the plane, (i, i) is corner i."""
 
 
 def clip_to_box(corner: Array, box: Array, periodic: tuple[bool, ...]) -> tuple[Array, Array]:
@@ -308,14 +300,9 @@ def clip_to_box(corner: Array, box: Array, periodic: tuple[bool, ...]) -> tuple[
             if not periodic[axis]:
                 height = sign * (corner[:, :, axis] - face)
                 corner, owner = _above(corner, owner, height)
-    solid = _is_solid(corner)
-    return corner[solid], owner[solid]
-
-
-def _is_solid(corner: Array) -> Array:
-    """Whether tetrahedra (C, 4, 3) have a volume beyond rounding, against the cube of an edge."""
     edge = np.ptp(corner, axis=1).max(axis=1)
-    return np.abs(geometry.signed_volume(corner)) > FLAT * edge**3
+    solid = np.abs(geometry.signed_volume(corner)) > FLAT * edge**3
+    return corner[solid], owner[solid]
 
 
 def _above(corner: Array, owner: Array, height: Array) -> tuple[Array, Array]:
@@ -324,49 +311,26 @@ def _above(corner: Array, owner: Array, height: Array) -> tuple[Array, Array]:
     count = positive.sum(axis=1)
     whole = count == 4
     corners, owners = [corner[whole]], [owner[whole]]
-    for kept, parts in ((1, _cut_one), (2, _cut_two), (3, _cut_three)):
+    for kept, parts in PARTS.items():
         chosen = np.flatnonzero(count == kept)
         order = np.argsort(~positive[chosen], axis=1, kind="stable")
-        sorted_corner = np.take_along_axis(corner[chosen], order[:, :, None], axis=1)
-        sorted_height = np.take_along_axis(height[chosen], order, axis=1)
-        pieces = parts(sorted_corner, sorted_height)
-        corners.append(pieces.reshape(-1, 4, 3))
-        owners.append(np.repeat(owner[chosen], pieces.shape[1]))
+        place = np.take_along_axis(corner[chosen], order[:, :, None], axis=1)
+        above = np.take_along_axis(height[chosen], order, axis=1)
+        cut = []
+        for part in parts:
+            points = [_meeting(place, above, i, j) for i, j in part]
+            cut.append(np.stack(points, axis=1))
+        corners.append(np.stack(cut, axis=1).reshape(-1, 4, 3))
+        owners.append(np.repeat(owner[chosen], len(parts)))
     return np.concatenate(corners), np.concatenate(owners)
 
 
-def _crossing(corner: Array, height: Array, first: int, second: int) -> Array:
-    """Points (C, 3) where the edges from corner `first` to `second` meet the plane."""
-    share = height[:, first] / (height[:, first] - height[:, second])
-    return corner[:, first] + share[:, None] * (corner[:, second] - corner[:, first])
-
-
-def _cut_one(corner: Array, height: Array) -> Array:
-    """One corner above the plane: the tetrahedron of this corner and three crossings."""
-    points = [corner[:, 0], *(_crossing(corner, height, 0, other) for other in (1, 2, 3))]
-    return np.stack(points, axis=1)[:, None]
-
-
-def _cut_two(corner: Array, height: Array) -> Array:
-    """Two corners above: a wedge with the triangles (0, 02, 03) and (1, 12, 13)."""
-    near = [corner[:, 0], _crossing(corner, height, 0, 2), _crossing(corner, height, 0, 3)]
-    far = [corner[:, 1], _crossing(corner, height, 1, 2), _crossing(corner, height, 1, 3)]
-    return _wedge(near, far)
-
-
-def _cut_three(corner: Array, height: Array) -> Array:
-    """Three corners above: a wedge between their facet and the three crossings."""
-    near = [corner[:, k] for k in (0, 1, 2)]
-    far = [_crossing(corner, height, k, 3) for k in (0, 1, 2)]
-    return _wedge(near, far)
-
-
-def _wedge(near: list[Array], far: list[Array]) -> Array:
-    """Three tetrahedra (C, 3, 4, 3) of the wedge between two triangles."""
-    a, b, c = near
-    d, e, f = far
-    pieces = [[a, b, c, d], [b, c, d, e], [c, d, e, f]]
-    return np.stack([np.stack(piece, axis=1) for piece in pieces], axis=1)
+def _meeting(corner: Array, height: Array, i: int, j: int) -> Array:
+    """Points (C, 3) where the edges from corner i to j meet the plane; corner i where i is j."""
+    if i == j:
+        return corner[:, i]
+    share = height[:, i] / (height[:, i] - height[:, j])
+    return corner[:, i] + share[:, None] * (corner[:, j] - corner[:, i])
 
 
 # ------------------------------------------------------------------------------------------------
@@ -427,152 +391,97 @@ def size_classes(radius: Array) -> list[Array]:
 # What the fines fill of each pore, exact for every fine.
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Holders:
-    """The pores (P) of a network, which hold fines, as tetrahedra inside the box.
-
-    Attributes:
-        network: whose pores they are.
-        piece: (K, 4, 3) m, the tetrahedra.
-        low: (K, 3) m, their lower corners.
-        high: (K, 3) m, their upper corners.
-        pore: (K,) that each is a part of.
-    """
+class Holders(NamedTuple):
+    """The pores (P) of a `network`, which hold fines, as tetrahedra inside the box."""
 
     network: Network
     piece: Array
-    low: Array
-    high: Array
+    """(K, 4, 3) m, the tetrahedra."""
     pore: Array
-
-    __repr__ = one_line
+    """(K,) that each is a part of."""
 
 
 def holders_of(network: Network) -> Holders:
     """The pores of a network, cut at the faces of its box."""
     piece, pore = clip_to_box(network.pore_corner, network.box, network.periodic)
-    return Holders(
-        network=network,
-        piece=frozen(np.ascontiguousarray(piece)),
-        low=frozen(piece.min(axis=1)),
-        high=frozen(piece.max(axis=1)),
-        pore=frozen(pore),
-    )
+    return Holders(network, frozen(np.ascontiguousarray(piece)), frozen(pore))
 
 
-def _pieces(holders: Holders, fines: Snapshot) -> Iterator[tuple[Array, Array, Array]]:
+def _pieces(holders: Holders, fines: Snapshot) -> tuple[Array, Array, Array]:
     """The tetrahedron and the fine (N,) of pairs that may touch, and what they share (N, 2).
 
-    That is the volume m3 and the surface m2 of the piece of the fine; it may be 0. The pairs of
-    one size of fines after the other are given, with the images across periodic sides.
+    That is the volume m3 and the surface m2 of the piece of the fine, also across periodic sides;
+    it may be 0. One size of fines after the other is searched.
     """
-    for some in size_classes(fines.radius) if len(fines) and len(holders.piece) else []:
+    parts = [(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 2)))]
+    low, high = holders.piece.min(axis=1), holders.piece.max(axis=1)
+    for some in size_classes(fines.radius) if len(fines) and len(low) else []:
         radius = fines.radius[some]
-        largest = float(radius.max())
-        low, high = holders.low.min(axis=0), holders.high.max(axis=0)
+        most, ends = float(radius.max()), (low.min(axis=0), high.max(axis=0))
         position, image = images_near(
-            holders.network, fines.position[some], low, high, largest, mirrored=False
+            holders.network, fines.position[some], *ends, most, mirrored=False
         )
-        pairs = points_in_boxes(position, holders.low - largest, holders.high + largest)
-        yield (
-            pairs[0],
-            some[image[pairs[1]]],
-            pieces(holders.piece, pairs, position, radius[image]),
-        )
+        piece, ball = points_in_boxes(position, low - most, high + most)
+        measured = pieces(holders.piece, piece, ball, position, radius[image])
+        parts.append((piece, some[image[ball]], measured))
+    piece, fine, measured = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return piece, fine, measured
 
 
 def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array]:
-    """What `fines`, each reaching into the box, fill of each tetrahedron.
+    """Volume (P,) m3 and surface (P,) m2 of `fines`, each reaching into the box, in the pores.
 
     Only what lies inside the box counts, with the images across periodic sides. A pore that a
     mirrored face cuts stands for the whole mirrored tetrahedron, so what the part inside holds is
     divided by the share inside (`Network.pore_share`); this is exact for all pores of one
     `pore_group` together. What fines hide of each other or of grains is not subtracted.
-
-    Returns:
-        Volume (P,) m3 and surface (P,) m2 of the fines inside.
     """
     holders = holders_of(network)
     filled, total = np.zeros((len(holders.piece), 2)), np.zeros((len(network.pore_corner), 2))
-    for piece, _, measured in _pieces(holders, fines):
-        np.add.at(filled, piece, measured)
+    piece, _, measured = _pieces(holders, fines)
+    np.add.at(filled, piece, measured)
     np.add.at(total, holders.pore, filled)
     volume, surface = (total / network.pore_share[:, None]).T
     return volume, surface
 
 
-# ------------------------------------------------------------------------------------------------
-# The deposit of a pack measured fine by fine, so that only fines that moved are measured anew.
-#
-# The volume of each fine in each pore is kept as a piece. When fines come, leave or move, their
-# pieces are replaced. The order of the pieces does not depend on which were kept, and so neither
-# do sums over them, to the last digit.
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class KeptDeposit:
-    """Fines (N) and their pieces (K) in the pores.
+class Deposit:
+    """Fines (N) and their K pieces in the pores (P), sorted by the id of the fine, then by pore.
 
     Attributes:
-        holders: of the network.
+        network: whose pores they are.
         fines: as they were measured.
         pore: (K,) that holds the piece.
-        fine: (K,) index of the fine; pieces are sorted by the number of the fine, then by pore.
+        fine: (K,) index of the fine.
         volume: (K,) m3 of the fine in the pore, over the share of the pore inside the box.
-        renewed: number of fines that the last change measured.
     """
 
-    holders: Holders
+    network: Network
     fines: Snapshot
     pore: Array
     fine: Array
     volume: Array
-    renewed: int
 
     __repr__ = one_line
 
     @property
     def in_pores(self) -> Array:
         """Volume (P,) m3 of the fines in each pore."""
-        return np.bincount(self.pore, self.volume, len(self.holders.network.pore_position))
-
-    def changed_to(self, fines: Snapshot) -> "KeptDeposit":
-        """The deposit of other `fines`; the pieces of those at the same place are kept."""
-        new, old = unmoved((fines.id, fines.position), (self.fines.id, self.fines.position))
-        moved = np.setdiff1d(np.arange(len(fines)), new, assume_unique=True)
-        now = np.full(len(self.fines), -1)
-        now[old] = new
-        stays = now[self.fine] >= 0
-        pore, fine, volume = _pieces_of(self.holders, fines.where(moved))
-        pore = np.concatenate([self.pore[stays], pore])
-        fine = np.concatenate([now[self.fine[stays]], moved[fine]])
-        volume = np.concatenate([self.volume[stays], volume])
-        return _sorted(self.holders, fines, (pore, fine, volume), renewed=len(moved))
+        return np.bincount(self.pore, self.volume, len(self.network.pore_position))
 
 
-def measured_deposit(holders: Holders, fines: Snapshot) -> KeptDeposit:
-    """The deposit of `fines`, each reaching into the box, all measured."""
-    return _sorted(holders, fines, _pieces_of(holders, fines), renewed=len(fines))
-
-
-def _sorted(
-    holders: Holders, fines: Snapshot, parts: tuple[Array, Array, Array], *, renewed: int
-) -> KeptDeposit:
-    """The deposit with its pieces (pore, fine, volume) sorted."""
-    order = np.lexsort((parts[0], fines.id[parts[1]]))
-    pore, fine, volume = (frozen(column[order]) for column in parts)
-    return KeptDeposit(
-        holders=holders, fines=fines, pore=pore, fine=fine, volume=volume, renewed=renewed
+def measured_deposit(holders: Holders, fines: Snapshot) -> Deposit:
+    """The deposit of `fines`, each reaching into the box."""
+    piece, fine, measured = _pieces(holders, fines)
+    pore, volume = holders.pore[piece], measured[:, 0]
+    order = np.lexsort((pore, fines.id[fine]))
+    order = order[volume[order] > 0.0]
+    pore, fine, volume = pore[order], fine[order], volume[order]
+    return Deposit(
+        network=holders.network,
+        fines=fines,
+        pore=frozen(pore),
+        fine=frozen(fine),
+        volume=frozen(volume / holders.network.pore_share[pore]),
     )
-
-
-def _pieces_of(holders: Holders, fines: Snapshot) -> tuple[Array, Array, Array]:
-    """Pore, fine and volume m3 of each piece of `fines`."""
-    parts = [(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros(0))]
-    for piece, fine, measured in _pieces(holders, fines):
-        real = measured[:, 0] > 0.0
-        pore = holders.pore[piece[real]]
-        share = holders.network.pore_share[pore]
-        parts.append((pore, fine[real], measured[real, 0] / share))
-    pore, fine, volume = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return pore, fine, volume

@@ -3,9 +3,10 @@
 Volume of spheres inside cylinders with flat ends: exact, and as the thesis estimates it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import atan2, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,14 +21,13 @@ from fdnet.network.fines.deposit import (
     reaching_inside,
 )
 from fdnet.network.network import Network
-from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line
+from fdnet.spheres.snapshot import Array, Snapshot, frozen
 
 GAUSS_POINTS = 10
 """Points of the Gauss-Legendre rule of `exact_volume`."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Pairs:
+class Pairs(NamedTuple):
     """K pairs of a sphere and a cylinder, which spans depth 0 to its length.
 
     Attributes:
@@ -44,45 +44,37 @@ class Pairs:
     tube: Array
     length: Array
 
-    __repr__ = one_line
-
     def where(self, mask: Array) -> "Pairs":
         """The pairs for which `mask` (K,) is true."""
-        return Pairs(
-            sphere=self.sphere[mask],
-            offset=self.offset[mask],
-            depth=self.depth[mask],
-            tube=self.tube[mask],
-            length=self.length[mask],
-        )
+        return Pairs(*(column[mask] for column in self))
 
 
-def exact_volume(pairs: Pairs, *, points: int = GAUSS_POINTS) -> Array:
+def exact_volume(pairs: Pairs) -> Array:
     """Volume (K,) m3 common to sphere and cylinder.
 
     Discs of the sphere, cut by the tube, are integrated along the axis: in closed form where the
-    disc lies within the tube or covers it; where they cross, by a Gauss-Legendre rule of `points`
-    points in the angle phi with place = middle + half sin(phi), which smooths the ends. The error
-    is below 1e-6 of the sphere (docs/validation/throat-occupancy.csv).
+    disc lies within the tube or covers it; where they cross, by a Gauss-Legendre rule in the angle
+    phi with place = middle + half sin(phi), which smooths the ends. The error is below 1e-6 of the
+    sphere (docs/validation/throat-occupancy.csv).
     """
     volume = np.zeros(len(pairs.sphere))
-    node, weights = np.polynomial.legendre.leggauss(points)
+    node, weight = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     angle = 0.5 * np.pi * node
-    rule = np.sin(angle), 0.5 * np.pi * weights * np.cos(angle)
-    _fill_volumes(pairs.sphere, pairs.offset, pairs.depth, pairs.tube, pairs.length, rule, volume)
+    rule = Rule(np.sin(angle), 0.5 * np.pi * weight * np.cos(angle))
+    _fill_volumes(pairs, rule, volume)
     return volume
 
 
+class Rule(NamedTuple):
+    """Places between -1 and 1 and weights of a rule of integration."""
+
+    place: Array
+    weight: Array
+
+
 @compiled
-def _fill_volumes(
-    sphere: Array,
-    offset: Array,
-    depth: Array,
-    tube: Array,
-    length: Array,
-    rule: tuple[Array, Array],
-    volume: Array,
-) -> None:
+def _fill_volumes(pairs: Pairs, rule: Rule, volume: Array) -> None:
+    sphere, offset, depth, tube, length = pairs
     for k in range(len(sphere)):
         a, d, r = sphere[k], offset[k], tube[k]
         low, high = max(-depth[k], -a), min(length[k] - depth[k], a)
@@ -104,19 +96,17 @@ def _segment(a: float, low: float, high: float) -> float:
 
 
 @compiled
-def _crossing(
-    a: float, d: float, r: float, low: float, high: float, rule: tuple[Array, Array]
-) -> float:
+def _crossing(a: float, d: float, r: float, low: float, high: float, rule: Rule) -> float:
     """Integral of the lens of the sphere's disc and the tube's, whose centres are `d` apart."""
     if high <= low:
         return 0.0
     total = 0.0
-    for m in range(len(rule[0])):
-        square = a**2 - (0.5 * (low + high) + 0.5 * (high - low) * rule[0][m]) ** 2
+    for m in range(len(rule.place)):
+        square = a**2 - (0.5 * (low + high) + 0.5 * (high - low) * rule.place[m]) ** 2
         to_chord = (d**2 + r**2 - square) / (2.0 * d)
         half = sqrt(max(r**2 - to_chord**2, 0.0))
         lens = r**2 * atan2(half, to_chord) + square * atan2(half, d - to_chord) - d * half
-        total += rule[1][m] * lens
+        total += rule.weight[m] * lens
     return 0.5 * (high - low) * total
 
 
@@ -182,10 +172,7 @@ def covers_section(pairs: Pairs) -> Array:
     )
 
 
-OVERLAPS: dict[str, Callable[[Pairs], Array]] = {
-    "exact": exact_volume,
-    "two-plane": two_plane_volume,
-}
+OVERLAPS = {"exact": exact_volume, "two-plane": two_plane_volume}
 """Estimates of the common volume by their names in a case."""
 
 
@@ -245,22 +232,18 @@ class Occupancy:
         )
 
 
-def measure_occupancy(
-    network: Network, fines: Snapshot, *, overlap: str | Callable[[Pairs], Array] = "exact"
-) -> Occupancy:
+def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exact") -> Occupancy:
     """What `fines` fill of the throats and pores of a network (Shi 2011, section 3.2).
 
     Throats and pores see every fine whose sphere reaches into the box, also one that is centred
-    upstream of it. Pores hold what of it lies inside the box; a pore or
-    throat that a mirrored face cuts stands for its mirrored part as well. Throats also see the
-    mirror images of the fines centred inside. Fines centred outside are counted
-    (`fines_outside_box`).
+    upstream of it. Pores hold what of it lies inside the box; a pore or throat that a mirrored
+    face cuts stands for its mirrored part as well. Throats also see the mirror images of the fines
+    centred inside. Fines centred outside are counted (`fines_outside_box`).
 
     Args:
         network: pores and throats of the grains.
         fines: the small spheres, m.
-        overlap: volume of a fine in a throat: "exact", "two-plane" (the thesis), or a function of
-            `Pairs` that returns the volumes (K,) m3.
+        overlap: volume of a fine in a throat, "exact" or "two-plane" (the thesis).
 
     Raises:
         CaseError: `overlap` is unknown.
@@ -276,13 +259,13 @@ def measure_occupancy(
         >>> print(f"{1e18 * occupancy.pore_solid_volume.sum():.0f} um3 of fines in the pores")
         523599 um3 of fines in the pores
     """
-    if isinstance(overlap, str) and overlap not in OVERLAPS:
+    if overlap not in OVERLAPS:
         raise CaseError(
             f"analysis.throat_overlap: {overlap!r} is not known; choose one of {sorted(OVERLAPS)}"
         )
     refuse_wide(network, fines)
     throat, fine, pairs = _touching_pairs(network, fines)
-    volume = OVERLAPS[overlap](pairs) if isinstance(overlap, str) else overlap(pairs)
+    volume = OVERLAPS[overlap](pairs)
     count = len(network.throat_radius)
     blocked = np.zeros(count, bool)
     blocked[throat[covers_section(pairs)]] = True
@@ -340,9 +323,7 @@ def _touching_pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pa
     throat = np.flatnonzero(network.throat_radius > 0)
     ends = network.throat_ends[throat]
     if not len(index) or not len(throat):
-        none = np.zeros(0)
-        pairs = Pairs(sphere=none, offset=none, depth=none, tube=none, length=none)
-        return throat[:0], index[:0], pairs
+        return throat[:0], index[:0], Pairs(*[np.zeros(0)] * 5)
     low, high = ends.min(axis=1), ends.max(axis=1)
     largest = float(fines.radius[index].max())
     # a throat shorter than the shortest allowed reaches beyond its ends
@@ -358,8 +339,7 @@ def _touching_pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pa
     sphere = fines.radius[fine]
     tube, length = network.throat_radius[throat], network.throat_length[throat]
     use = (offset < sphere + tube) & (depth > -sphere) & (depth < length + sphere)
-    pairs = Pairs(sphere=sphere, offset=offset, depth=depth, tube=tube, length=length)
-    return throat[use], fine[use], pairs.where(use)
+    return throat[use], fine[use], Pairs(sphere, offset, depth, tube, length).where(use)
 
 
 def ratio(top: Array, bottom: Array) -> Array:

@@ -251,38 +251,23 @@ def section_edges(sections: int | Sequence[float], box: Array) -> Array:
     `sections` is a count of equal slabs, or the edges m themselves; `box` (3, 2) m. Raises
     CaseError unless the edges ascend from face to face.
     """
-    low, high = float(box[0, 0]), float(box[0, 1])
+    low, high = map(float, box[0])
     if isinstance(sections, int | np.integer):
-        if sections < 1:
-            raise CaseError(
-                f"analysis.sections: {sections} is not a count of slabs; give 1 or more"
-            )
         return np.linspace(low, high, int(sections) + 1)
     edges = np.array(sections, dtype=float)
     tolerance = FACE_TOLERANCE * (high - low)
-    if (
-        len(edges) < 2
-        or np.any(np.diff(edges) <= 0)
-        or abs(edges[0] - low) > tolerance
-        or abs(edges[-1] - high) > tolerance
-    ):
+    ascend = len(edges) > 1 and np.all(np.diff(edges) > 0)
+    if not ascend or np.any(np.abs(edges[[0, -1]] - (low, high)) > tolerance):
         raise CaseError(
             f"analysis.sections: edges {edges.tolist()} do not ascend from {low:g} to {high:g} m"
         )
-    edges[0], edges[-1] = low, high
+    edges[[0, -1]] = low, high
     return edges
 
 
 def profile_edges(bin_size: float, box: Array) -> Array:
-    """Edges (B+1,) m of equal bins that fill the box, as near to `bin_size` m as possible.
-
-    `box` (3, 2) m. Raises CaseError on a bin that is not above 0.
-    """
+    """Edges (B+1,) m of equal bins of about `bin_size` m that fill the `box` (3, 2) m."""
     low, high = float(box[0, 0]), float(box[0, 1])
-    if not bin_size > 0:
-        raise CaseError(
-            f"analysis.profile_bin_mm: {1e3 * bin_size:g} is not above 0; give a bin thickness"
-        )
     return np.linspace(low, high, max(1, round((high - low) / bin_size)) + 1)
 
 
@@ -320,16 +305,15 @@ def thin_slabs(sections: Sequence[Section], diameter: float) -> Iterator[str]:
     """A warning if sections are thinner than the mean `diameter` of the grains, m."""
     least = diameter * (1.0 - DIAMETER_TOLERANCE)
     thin = [one.section for one in sections if one.x_hi - one.x_lo < least]
-    if not thin:
-        return
-    count = int((sections[-1].x_hi - sections[0].x_lo) / least)
-    cure = f"take fewer sections: analysis.sections = {count} or less"
-    yield Doubt(
-        "thin-sections",
-        f"sections {thin} are thinner than the mean grain diameter ({1e3 * diameter:.3g} mm): the "
-        "permeability of each is that of single throats; "
-        + (cure if count else "take a specimen that is longer along x"),
-    )
+    if thin:
+        count = int((sections[-1].x_hi - sections[0].x_lo) / least)
+        cure = f"take fewer sections: analysis.sections = {count} or less"
+        yield Doubt(
+            "thin-sections",
+            f"sections {thin} are thinner than the mean grain diameter ({1e3 * diameter:.3g} mm): "
+            "the permeability of each is that of single throats; "
+            + (cure if count else "take a specimen that is longer along x"),
+        )
 
 
 def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array) -> Profile:

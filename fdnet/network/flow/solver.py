@@ -3,11 +3,8 @@
 Systems are symmetric and positive definite.
 """
 
-import contextlib
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pyamg
@@ -23,12 +20,9 @@ from fdnet.spheres.snapshot import Array, one_line
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
 DIRECT_UP_TO = 3_000
 """Number of nodes up to which the direct solver is used."""
-DIRECT_BYTES, DIRECT_GROWTH = 55.0, 1.41
-"""A direct solve of n nodes takes 55 n^1.41 bytes, measured on packs of 1e4 to 3e5 pores."""
-MEMORY_CAP = 8e9
-"""Most memory, bytes, that a direct solve may take."""
-MEMORY_SHARE = 0.8
-"""Most memory that a direct solve may take, as a share of what is free."""
+MOST_DIRECT = 600_000
+"""Nodes beyond which a direct solve takes more than 8 GB: some 55 n^1.41 bytes, measured on packs
+of 1e4 to 3e5 pores."""
 CG_TOLERANCE, CG_STEPS = 1e-7, 100
 """Sum of the residuals over that of the sources, and number of steps, of conjugate gradients."""
 STRENGTH = 0.5
@@ -40,12 +34,12 @@ Solve = Callable[[Array, float], Array]
 class Balances:
     """The system sum_j g_ij (p_i - p_j) + tied_i p_i = source_i, kept for many sources.
 
-    Up to 3,000 nodes it is solved directly. Larger systems are solved by
-    conjugate gradients with Ruge-Stuben multigrid (Ruge and Stuben 1987; second pass, strength
-    0.5). Multigrid works on the system as it stands, whose near-kernel is the constant that the
-    interpolation assumes; scaled to a unit diagonal it needs several times the steps. Where it
-    does not converge, the direct solver is used as long as its estimated memory fits. The study
-    linear-solver shows what these choices cost.
+    Up to 3,000 nodes it is solved directly. Larger systems are solved by conjugate gradients with
+    Ruge-Stuben multigrid (Ruge and Stuben 1987; second pass, strength 0.5). Multigrid works on the
+    system as it stands, whose near-kernel is the constant that the interpolation assumes; scaled
+    to a unit diagonal it needs several times the steps. Where it does not converge, the direct
+    solver is used up to `MOST_DIRECT` nodes. The study linear-solver shows what these choices
+    cost.
 
     Args:
         pair: (K, 2) nodes that the links join.
@@ -79,14 +73,19 @@ class Balances:
             if self._solve is None:
                 self._solve = (direct if self._direct else multigrid)(self._matrix)
             pressure = self._solve(source, within)
+            if not (self._direct or np.all(np.isfinite(pressure))):
+                if len(source) > MOST_DIRECT:
+                    raise FlowError(
+                        f"solve of {len(source)} pores: multigrid did not converge in {CG_STEPS} "
+                        f"steps, and a direct solve takes at most {MOST_DIRECT} pores; analyse a "
+                        "shorter specimen"
+                    )
+                self._direct, self._solve = True, direct(self._matrix)
+                pressure = self._solve(source, within)
         except (RuntimeError, ZeroDivisionError) as error:  # of multigrid, which has no check
             raise FlowError(
                 f"solve of {len(source)} pores failed: {error}; a group of pores has no way out"
             ) from error
-        if not self._direct and not np.all(np.isfinite(pressure)):
-            _check_memory(len(source))
-            self._direct, self._solve = True, direct(self._matrix)
-            pressure = self._solve(source, within)
         return pressure
 
 
@@ -107,21 +106,14 @@ def laplacian(pair: Array, conductance: Array, tied: Array) -> sparse.csr_matrix
 def direct(matrix: sparse.csr_matrix) -> Solve:
     """Direct solver of the system `matrix` (n, n), scaled to a unit diagonal (`factored`).
 
-    Raises FlowError when the system is singular.
+    Raises RuntimeError when the system is singular.
     """
-    count, diagonal = matrix.shape[0], matrix.diagonal()
+    diagonal = matrix.diagonal()
     if np.any(diagonal <= 0):
-        raise FlowError(
-            f"solve of {count} pores failed: {np.sum(diagonal <= 0)} pores have no way out"
-        )
+        raise RuntimeError(f"{np.sum(diagonal <= 0)} pores have no link")
     scale = 1.0 / np.sqrt(diagonal)
     scaled = (sparse.diags(scale) @ matrix @ sparse.diags(scale)).tocsr()
-    try:
-        solve = factored(scaled, dissected(scaled.copy()))
-    except RuntimeError as error:
-        raise FlowError(
-            f"solve of {count} pores failed: {error}; a group of pores has no way out"
-        ) from error
+    solve = factored(scaled, dissected(scaled.copy()))
     return lambda source, _: solve(source * scale) * scale
 
 
@@ -163,10 +155,9 @@ def dissected(links: sparse.csr_matrix) -> Array:
 def multigrid(matrix: sparse.csr_matrix) -> Solve:
     """Conjugate gradients with a symmetric Ruge-Stuben V-cycle as the preconditioner.
 
-    Nodes that are linked are brought close together in memory (Cuthill and McKee 1969, reversed),
-    which makes a cycle a sixth faster. The solution is NaN where 100 steps do not suffice.
-    Thousands of pores without a link (in a thin slab, or a clogged pack) stay on the coarsest
-    level, which is therefore solved as a sparse system.
+    Nodes that are linked are brought close together in memory (Cuthill and McKee 1969, reversed):
+    a sixth faster. The solution is NaN where 100 steps do not suffice. Pores without a link stay
+    on the coarsest level, which is therefore solved as a sparse system.
     """
     order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
     matrix = matrix[order][:, order]
@@ -230,24 +221,6 @@ def conjugate_gradients(
         missing -= step * turned
         before = gain
     return np.full(len(source), np.nan)
-
-
-def _check_memory(count: int) -> None:
-    """Raise FlowError when a direct solve of `count` pores would not fit into memory."""
-    free, report = np.inf, Path("/proc/meminfo")
-    if report.exists():
-        rows = dict(row.split(":") for row in report.read_text().splitlines())
-        free = 1024.0 * float(rows["MemAvailable"].split()[0])
-    else:
-        with contextlib.suppress(AttributeError, OSError, ValueError):  # not reported
-            free = float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    wanted, limit = DIRECT_BYTES * count**DIRECT_GROWTH, min(MEMORY_CAP, MEMORY_SHARE * free)
-    if wanted > limit:
-        raise FlowError(
-            f"solve of {count} pores: multigrid did not converge in {CG_STEPS} steps and a direct "
-            f"solve would take some {wanted / 1e9:.1f} GB of {limit / 1e9:.1f} GB; analyse a "
-            "shorter specimen"
-        )
 
 
 # ------------------------------------------------------------------------------------------------

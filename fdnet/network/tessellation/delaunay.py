@@ -1,6 +1,7 @@
 """Grains in their box with images and mirror images, and the tetrahedra between them."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import ConvexHull, Delaunay, QhullError
@@ -63,10 +64,9 @@ class PlacedGrains:
 
 
 def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> PlacedGrains:
-    """The grains that reach into the box, ready for the tessellation.
+    """The grains that reach into the box and add to the solid, ready for the tessellation.
 
-    Grains that add nothing to the solid are left out. Raises NetworkError on impossible lengths
-    (`check_lengths`) and on fewer than four grains in the box.
+    Raises NetworkError on impossible lengths (`check_lengths`) and on fewer than four such grains.
     """
     if len(grains):
         check_lengths(grains, periodic)
@@ -116,8 +116,7 @@ def check_lengths(spheres: Snapshot, periodic: tuple[bool, ...]) -> None:
     """Raise NetworkError on lengths that no tessellation can work with.
 
     These are radii or box sides that are not positive, lengths whose cubes no double number holds,
-    and a box, or centres along its periodic sides, so far from the origin that their coordinates
-    are rounded by more than 1e-8 mean radii.
+    and coordinates so far from the origin that they are rounded by more than 1e-8 mean radii.
     """
     box, radius = spheres.box, spheres.radius
     if np.any(radius <= 0):
@@ -192,11 +191,9 @@ def _radius_of_cap(cap: Array, depth: float) -> Array:
 #
 # Along a periodic axis a grain has images shifted by whole periods. A face that is not periodic is
 # a mirror plane: it separates every grain from its own mirror image, so the power centres of what
-# lies inside the box are inside too, and those of what the face cuts lie on the face.
-#
-# A shake of 1e-7 mean grain radii, for the tessellation alone and the same for all periodic images
-# of a grain, splits cospherical sets of grains (lattices, and always the prisms cut by a face) in
-# the same manner everywhere.
+# lies inside the box are inside too, and those of what the face cuts lie on the face. A shake of
+# 1e-7 mean grain radii, for the tessellation alone and the same for all periodic images of a
+# grain, splits cospherical sets of grains (lattices, prisms cut by a face) alike everywhere.
 
 
 SHAKE = 1e-7
@@ -204,8 +201,7 @@ SHAKE = 1e-7
 SHAKE_SEED = 3_141_592
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ImagePoints:
+class ImagePoints(NamedTuple):
     """M images of n grains, the grains themselves among them.
 
     Attributes:
@@ -229,8 +225,6 @@ class ImagePoints:
     scaled: Array
     name: Array
     key: Array
-
-    __repr__ = one_line
 
 
 def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) -> ImagePoints:
@@ -268,10 +262,8 @@ def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) 
 
 
 # ------------------------------------------------------------------------------------------------
-# What is measured on one tetrahedron after the other, in one compiled pass.
-#
-# Written for the corners of one tetrahedron, so that a whole pack needs no arrays in between. The
-# solid angle is that of van Oosterom and Strackee 1983 (IEEE Trans. Biomed. Eng. 30, 125, eq. 8).
+# What is measured on one tetrahedron after the other, in one compiled pass, so that a whole pack
+# needs no arrays in between.
 
 
 Vector = tuple[float, float, float]
@@ -385,11 +377,8 @@ def touching_spheres(
         touching[t] = rest / below if below != 0.0 else np.nan
         if not touching[t] > -min(first, radius[b], radius[c], radius[d]):
             touching[t] = np.nan
-        offset = (
-            u[0] + v[0] * touching[t],
-            u[1] + v[1] * touching[t],
-            u[2] + v[2] * touching[t],
-        )
+        s = touching[t]
+        offset = u[0] + v[0] * s, u[1] + v[1] * s, u[2] + v[2] * s
         for k in range(3):
             centre[t, k] = points[a, k] + offset[k]
         within[t] = _within(one, two, three, offset, tolerance)
@@ -442,7 +431,10 @@ def solids(points: Array, radius: Array, vertex: Array) -> tuple[Array, Array]:
 
 @compiled
 def _corner_angle(points: Array, corner: Array, i: int, triple: float) -> float:
-    """Solid angle sr at corner `i`; `triple` m3 is six times the volume."""
+    """Solid angle sr at corner `i`; `triple` m3 is six times the volume.
+
+    Van Oosterom and Strackee 1983 (IEEE Trans. Biomed. Eng. 30, 125, eq. 8).
+    """
     a = less(points, corner[(i + 1) % 4], corner[i])
     b = less(points, corner[(i + 2) % 4], corner[i])
     c = less(points, corner[(i + 3) % 4], corner[i])
@@ -477,7 +469,6 @@ def _lens(first: float, second: float, apart: float) -> tuple[float, float]:
 
 # ------------------------------------------------------------------------------------------------
 # Tetrahedra of grains and images: Delaunay's, or for unequal grains of the power tessellation.
-#
 # Along a periodic axis tetrahedra that differ by whole periods are one.
 
 
@@ -489,8 +480,7 @@ EQUAL_SPREAD = 1e-3
 """Radii that spread by at most this share of their mean are treated as equal."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Tetrahedra:
+class Tetrahedra(NamedTuple):
     """P unique tetrahedra between M points.
 
     Attributes:
@@ -514,8 +504,6 @@ class Tetrahedra:
     flat: Array
     margin: Array
     hidden: int
-
-    __repr__ = one_line
 
 
 def make_tetrahedra(
@@ -560,17 +548,12 @@ def _tessellated(
     try:
         if unequal:
             return _power_hull(points.scaled, points.radius / scale)
-        return _delaunay(points.scaled)
+        mesh = Delaunay(points.scaled)
     except QhullError as error:
         raise NetworkError(
             f"tessellation of {grains} grains failed, they lie in one plane or line: "
             f"{str(error).splitlines()[0]}"
         ) from error
-
-
-def _delaunay(points: Array) -> tuple[Array, Array]:
-    """Tetrahedra and neighbours (-1: none) of Delaunay's tessellation of `points` (M, 3)."""
-    mesh = Delaunay(points)
     if len(mesh.coplanar):
         raise NetworkError(
             f"tessellation: {len(mesh.coplanar)} grains coincide with another grain's image "
@@ -617,10 +600,8 @@ def _unique(
     # they are then parts of a polyhedron that the face cuts
     check = np.flatnonzero(good & beyond)
     vertex = corner[check]
-    place, scale = (
-        points.shaken[vertex],
-        float(points.radius[vertex].mean()) if len(check) else 0.0,
-    )
+    place = points.shaken[vertex]
+    scale = float(points.radius[vertex].mean()) if len(check) else 0.0
     tolerance, flattest = SAME_CENTRE * scale, FLAT * scale**3
     centre, _, _, flat = centres(
         points.shaken, points.shaken, points.radius, vertex, flattest, 0.0

@@ -1,7 +1,7 @@
 """Facets that two tetrahedra share, and the polyhedra that tetrahedra make."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -21,11 +21,10 @@ from fdnet.network.tessellation.delaunay import (
     times,
 )
 from fdnet.spheres.geometry import INSIDE, MIRROR_LOW, ON_FACE, packed_shift, repeated
-from fdnet.spheres.snapshot import Array, Snapshot, one_line
+from fdnet.spheres.snapshot import Array, Snapshot
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Facets:
+class Facets(NamedTuple):
     """T facets, each shared by two tetrahedra.
 
     Attributes:
@@ -42,17 +41,10 @@ class Facets:
     vertex: Array
     unmatched: int
 
-    __repr__ = one_line
-
     def where(self, mask: Array) -> "Facets":
         """The facets for which `mask` (T,) is true."""
-        return Facets(
-            pore=self.pore[mask],
-            opposite=self.opposite[mask],
-            shift=self.shift[mask],
-            vertex=self.vertex[mask],
-            unmatched=self.unmatched,
-        )
+        pore, opposite, shift, vertex = (column[mask] for column in self[:4])
+        return Facets(pore, opposite, shift, vertex, self.unmatched)
 
 
 def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, ...]) -> Facets:
@@ -73,7 +65,7 @@ def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, ..
     corner = np.take_along_axis(corner, np.argsort(points.key[corner], axis=1), axis=1)
     names, shifts = points.name[corner], points.shift[corner]
     relative = packed_shift(shifts - shifts[:, :1])
-    columns = [names[:, 0], names[:, 1], names[:, 2], relative[:, 1], relative[:, 2]]
+    columns = [*names.T, *relative[:, 1:].T]
     order = np.lexsort(columns)
     same = np.all([column[order][1:] == column[order][:-1] for column in columns], axis=0)
     at, to = order[:-1][same], order[1:][same]
@@ -86,12 +78,8 @@ def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, ..
     above = np.all(place >= box[:, 1] - tolerance, axis=1)
     beyond = np.any((below | above) & ~np.array(periodic), axis=1)
     first, second = single[at], single[to]
-    pore = np.concatenate(
-        [np.stack([one, two], axis=1), np.stack([first // 4, second // 4], axis=1)]
-    ).astype(np.int32)
-    ends = np.concatenate(
-        [np.stack([opposite, back], axis=1), np.stack([first % 4, second % 4], axis=1)]
-    ).astype(np.int8)
+    pore = np.hstack([[one, two], [first // 4, second // 4]]).T.astype(np.int32, "C")
+    ends = np.hstack([[opposite, back], [first % 4, second % 4]]).T.astype(np.int8, "C")
     corners = geometry.FACETS[ends[:, 0]]
     return Facets(
         pore=pore,
@@ -124,8 +112,7 @@ MOST_PERIODS, MOST_IMAGES, IMAGES_A_GRAIN = 64, 50_000, 30
 take hours. (Dense packs need 1 to 2 periods, a unit cell 125 images.)"""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Tessellation:
+class Tessellation(NamedTuple):
     """Tetrahedra (P) of placed grains and the facets (T) between them.
 
     Attributes:
@@ -143,8 +130,6 @@ class Tessellation:
     size: Array
     periodic: tuple[bool, bool, bool]
     scale: float
-
-    __repr__ = one_line
 
 
 def tessellate(placed: PlacedGrains) -> Tessellation:
@@ -363,8 +348,7 @@ def heights(
 ADOPTION_ROUNDS = 8
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Polyhedra:
+class Polyhedra(NamedTuple):
     """Power centres of the tetrahedra (P), and which tetrahedra share one.
 
     Attributes:
@@ -379,8 +363,6 @@ class Polyhedra:
     heights: Array
     group: Array
     wall: Array
-
-    __repr__ = one_line
 
 
 def join_polyhedra(tessellation: Tessellation) -> Polyhedra:

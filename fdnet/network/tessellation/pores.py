@@ -4,13 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from fdnet.network import geometry
 from fdnet.network.tessellation.delaunay import solids, touching_spheres
-from fdnet.network.tessellation.facets import (
-    Polyhedra,
-    Tessellation,
-    sections,
-)
+from fdnet.network.tessellation.facets import Polyhedra, Tessellation, sections
 from fdnet.spheres.snapshot import Array
 
 INSIDE_TOLERANCE = 1e-5
@@ -132,10 +127,9 @@ def measure_throats(
     facets, wall = tessellation.facets.where(kept), wall[kept]
     one, two = facets.pore.T
     shift = (pores["pore_wrap"][two] + facets.shift - pores["pore_wrap"][one]).astype(np.int16)
-    length, position = np.empty(len(one)), pores["pore_position"]
-    for part in geometry.slices(len(length)):
-        there = position[two[part]] + shift[part] * tessellation.size
-        length[part] = np.linalg.norm(there - position[one[part]], axis=1)
+    position = pores["pore_position"]
+    there = position[two] + shift * tessellation.size
+    length = np.linalg.norm(there - position[one], axis=1)
     inscribed, opened, overlapping = sections(
         points.position, points.radius, facets.vertex, TOUCHING
     )
