@@ -1,6 +1,7 @@
 """The runs of the thesis's specimens: their plan, how they are made, and the states kept."""
 
 import json
+import re
 import tomllib
 import zipfile
 import zlib
@@ -29,8 +30,8 @@ class Planned:
     """One run: a shipped case with a seed and perhaps a changed setting, from plan.csv.
 
     The group is "specimen", "variant", "quick", "reason" (what might let more fines in), or what
-    is scanned ("friction", "drag", "supply", with its value). The name of a quick form begins with
-    "quick-". The setting is "key=value"; the consequence is one that follows and is not named.
+    is scanned ("friction", "drag", "supply", with its value). The setting is "key=value"; the
+    consequence is one that follows and is not named.
     """
 
     group: str
@@ -63,12 +64,8 @@ class Planned:
 
 def points() -> list[Planned]:
     """All rows of plan.csv, one a seed; a scan also has the case itself, at its own value."""
-    rows = [vars(row) for row in rows_in("plan.csv")]
-    return [
-        Planned(seed=int(seed), **{name: text for name, text in row.items() if name != "seeds"})
-        for row in rows
-        for seed in row["seeds"].split()
-    ]
+    rows = [row._asdict() for row in rows_in("plan.csv")]
+    return [Planned(seed=int(one), **row) for row in rows for one in row.pop("seeds").split()]
 
 
 def planned(*, quick: bool = False) -> list[Planned]:
@@ -82,44 +79,41 @@ def planned(*, quick: bool = False) -> list[Planned]:
 
 
 # ---- The runs.
-def make_runs(
-    plan: Sequence[Planned], states: Path, runs: Path, *, jobs: int, show: bool
-) -> list[str]:
+def make_runs(plan: Sequence[Planned], states: Path, runs: Path, *, jobs: int) -> list[str]:
     """Make the runs that have no state in `states`; returns what failed, one sentence each.
 
     Cases with the same setting and seeds are one sweep in a folder of `runs`, which goes on where
     it was cut. Two runs with the same invasion (Table 3 and specimen 7) are made once.
     """
     find_binary()
-    runs.mkdir(parents=True, exist_ok=True)
-    sweeps: dict[tuple[Any, ...], list[Planned]] = {}
+    for folder in (states, runs):
+        folder.mkdir(parents=True, exist_ok=True)
+    sweeps: dict[tuple[Any, ...], dict[str, Planned]] = {}
     invasions = set()
     for item in plan:
         invasion = item.load().digest("invade")
         if find_state(states, item) is None and invasion not in invasions:
             seeds = tuple(one.seed for one in plan if one.id == item.id)
-            sweeps.setdefault((item.group, seeds, *item.settings), []).append(item)
+            same = sweeps.setdefault((item.group, seeds, *item.settings), {})
+            same[item.load().digest()] = item
         invasions.add(invasion)
     failed = []
     for (group, seeds, *settings), items in sweeps.items():
-        name = "-".join([group, *map(str, seeds), *settings])
-        name = "".join(one if one.isalnum() or one in ".-" else "-" for one in name)
-        cases = [str(case_path(one)) for one in dict.fromkeys(item.name for item in items)]
+        name = re.sub(r"[^\w.-]|_", "-", "-".join([group, *map(str, seeds), *settings]))
+        cases = [str(case_path(one)) for one in dict.fromkeys(i.name for i in items.values())]
         keys = {key: _value(text) for key, _, text in (one.partition("=") for one in settings)}
         sweep = {"name": name, "cases": cases, "seeds": [*seeds], "set": keys}
         file = write_text(runs / f"{name}.toml", tomli_w.dumps(sweep))
         stages = ("pack", "invade", "analyse")
-        fdnet.sweep(file, out=runs / name, jobs=jobs, stages=stages, progress=show)
-        made = {}
+        fdnet.sweep(file, out=runs / name, jobs=jobs, stages=stages, progress=True)
         for folder in (runs / name / "runs").iterdir():
             try:
                 state = state_of_run(folder)
-                made[state.case.digest()] = state
             except CaseError as error:
                 failed.append(str(error))
-        for item in items:
-            if item.load().digest() in made:
-                write_state(states / item.file, made[item.load().digest()])
+                continue
+            if state.case.digest() in items:
+                write_state(states / items[state.case.digest()].file, state)
     return failed
 
 
@@ -137,8 +131,7 @@ class State:
     """A specimen before and after its invasion.
 
     `grains` are as packed, `damaged` are the grains and all remaining fines at the end, those
-    upstream too, m. The ending has the numbers of fines `supplied` and `passed`, `stop_reason`,
-    computing times (`seconds`, `pack_seconds`), `steps`, their length `dt_s`, and `max_overlap`.
+    upstream too, m. The ending has numbers of the run by the names of results.csv.
     """
 
     case: InvasionCase
@@ -152,13 +145,10 @@ def state_of_run(folder: Path) -> State:
     run = fdnet.open_run(folder)
     summary, invasion = run.summary, run.manifest["invade"]
     names = ("stop_reason", "seconds", "steps", "dt_s", "max_overlap", "supplied")
-    return State(
-        case=with_fines(run.case),
-        grains=run.spheres("initial"),
-        damaged=run.spheres("damaged"),
-        ending={name: invasion[name] for name in names}
-        | {"passed": summary["passed_count"], "pack_seconds": run.manifest["pack"]["seconds"]},
-    )
+    ending = {name: invasion[name] for name in names} | {"passed": summary["passed_count"]}
+    ending["pack_seconds"] = run.manifest["pack"]["seconds"]
+    spheres = {"grains": run.spheres("initial"), "damaged": run.spheres("damaged")}
+    return State(case=with_fines(run.case), ending=ending, **spheres)
 
 
 def write_state(path: Path, state: State) -> None:
@@ -172,7 +162,6 @@ def write_state(path: Path, state: State) -> None:
         arrays[f"{name}_id"] = spheres.id.astype(np.uint32)
     buffer = BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_bytes(path, buffer.getvalue())
 
 
@@ -185,9 +174,8 @@ def read_state(path: Path) -> State:
         case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
         grains, damaged = (_spheres(arrays, name, case) for name in ("grains", "damaged"))
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise CaseError(
-            f"{path}: is no kept state ({error}); remove it and run the study anew"
-        ) from error
+        advice = "remove it and run the study anew"
+        raise CaseError(f"{path}: is no kept state ({error}); {advice}") from error
     return State(case=case, grains=grains, damaged=damaged, ending=text["ending"])
 
 
@@ -204,10 +192,8 @@ def find_state(states: Path, item: Planned) -> State | None:
             if state.case.digest("invade") == case.digest("invade"):
                 return replace(state, case=case)
             if path.name == item.file:
-                raise CaseError(
-                    f"{path}: is the state of another case than {item.id}; remove it to run the "
-                    "case anew"
-                )
+                what = f"is the state of another case than {item.id}"
+                raise CaseError(f"{path}: {what}; remove it to run the case anew")
     return None
 
 
