@@ -7,6 +7,7 @@ its quick form, which is cautious: that has a sixth of the cross-section.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,18 +17,15 @@ from scipy.stats import t as student
 
 from fdnet.case.file import QUICK
 from fdnet.spheres.snapshot import Array
-from validation.thesis.published import SPECIMENS, TABLE3, in_words, reductions, rows_in, thesis_of
+from validation.thesis.published import in_words, reductions, rows_in, thesis_of
 from validation.thesis.quantities import SECTIONS
 
 Table = Any  # rows of results.csv as a pandas table, or a column of it
 LAWS = ("thesis, thesis", "lubrication, auto", "lubrication, all-spheres")
 """The thesis's laws, an earlier default of fdnet (rows of earlier scripts), and that of today."""
-HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "not decided"
 MARGIN, OVERLAP, PASSED, ROUNDING = 0.20, 0.05, 0.05, 1e-9
 """Losses of porosity are alike within a fifth of the larger. Overlap over a diameter and share of
 fines passed through above which a remark is made. Differences that count as none."""
-
-
 QUANTITIES: Mapping[str, Any] = {row.quantity: row for row in rows_in("quantities.csv")}
 """The quantities of a run by name, from quantities.csv.
 
@@ -106,37 +104,22 @@ def half_width(*means: Mean) -> float:
 
 
 # ---- Tables 3 to 11: tables.csv.
-ONE, FIVE = ("specimen1", "specimen1-7to8", "specimen1-1410"), ("specimen5", "specimen5-5to6")
-TABLES: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
-    "Table 3": ((TABLE3,), [*QUANTITIES][:6]),
-    "Table 4": (SPECIMENS[:6], [*QUANTITIES][:6]),
-    "Table 5": (SPECIMENS[6:7], [*QUANTITIES][:6]),
-    "Table 6": (SPECIMENS[7:], [*QUANTITIES][:6]),
-    "Table 7": (ONE, [*QUANTITIES][:13]),
-    "Table 8": (ONE, ["k_reduction", "k_reduction_inplace"]),
-    "Table 9": (FIVE, [*QUANTITIES][:13]),
-    "Table 10": (FIVE, ["k_reduction", "k_reduction_inplace"]),
-    "Table 11": (SPECIMENS[7:], [*QUANTITIES][:13]),
-    "Figures 49, 58, 65, 69, 72": ((TABLE3, *SPECIMENS), [*QUANTITIES][12:14]),
-}
-"""The runs next to each of the thesis's tables, and the quantities, or k by section."""
-
-
 def tables(results: Table) -> Iterator[dict[str, Any]]:
-    """Rows of tables.csv: each number of the thesis's tables next to ours with its band."""
-    for table, (runs, names) in TABLES.items():
-        for run in runs:
-            for laws in (LAWS[0], LAWS[2]):
-                rows = rows_of(results, run, laws)
-                for name, given, values, unit, by_law in _cells(rows, run, names):
-                    if laws != LAWS[0] and not by_law:
-                        continue
-                    mean = mean_of(values.dropna().to_numpy(float))
-                    row = {"table": table, "run": run, "quantity": name}
-                    row |= {"laws": laws if by_law else "", "unit": unit, "thesis": given}
-                    row |= {"ours": mean.mean, "half_width": half_width(mean)}
-                    row |= {"seeds": mean.seeds}
-                    yield row | {"ended_by": ", ".join(dict.fromkeys(rows.stop_reason))}
+    """Rows of tables.csv: each number of the thesis's tables next to ours with its band.
+
+    compared.csv has the runs next to each table, and the quantities, or k by section.
+    """
+    for table in rows_in("compared.csv"):
+        for run, laws in product(table.runs.split("|"), (LAWS[0], LAWS[2])):
+            rows = rows_of(results, run, laws)
+            for name, given, values, unit, by_law in _cells(rows, run, table.names.split("|")):
+                if laws != LAWS[0] and not by_law:
+                    continue
+                mean = mean_of(values.dropna().to_numpy(float))
+                row = {"table": table.table, "run": run, "quantity": name}
+                row |= {"laws": laws if by_law else "", "unit": unit, "thesis": given}
+                row |= {"ours": mean.mean, "half_width": half_width(mean), "seeds": mean.seeds}
+                yield row | {"ended_by": ", ".join(dict.fromkeys(rows.stop_reason))}
 
 
 def _cells(rows: Table, run: str, names: Sequence[str]) -> Iterator[tuple[Any, ...]]:
@@ -197,9 +180,11 @@ def responses(results: Table, run: str, response: str) -> list[float]:
     made = []
     for _, one in table[(rows.id == run) | (scanned[0] == run)].dropna().groupby("seed"):
         x, y = one.x.to_numpy(), one.y.to_numpy()
-        if len(one) >= 3 and response.startswith("rank"):
+        if len(one) < 3:
+            continue
+        if response.startswith("rank"):
             made.append(0.0 if np.ptp(y) == 0 else float(spearmanr(x, y).statistic))
-        elif len(one) >= 3:
+        else:
             made.append(float(np.dot(x - x.mean(), y) / np.dot(x - x.mean(), x)))
     return made
 
@@ -231,11 +216,10 @@ def _mean(results: Table, run: str, quantity: str, laws: str) -> Mean:
 
 def verdict(sense: str, low: float, high: float, margin: float) -> str:
     """What the 95 % interval of a difference decides; "alike" is within `margin`."""
+    holds, fails = low > ROUNDING, high < -ROUNDING
     if sense == "alike":
-        if -margin <= low and high <= margin:
-            return HOLDS
-        return FAILS if low > margin or high < -margin else UNDECIDED
-    return HOLDS if low > ROUNDING else FAILS if high < -ROUNDING else UNDECIDED
+        holds, fails = -margin <= low and high <= margin, low > margin or high < -margin
+    return "holds" if holds else "does not hold" if fails else "not decided"
 
 
 def _notes(results: Table, names: Sequence[str], claim: Any, *, deep: bool) -> Iterator[str]:
@@ -248,13 +232,11 @@ def _notes(results: Table, names: Sequence[str], claim: Any, *, deep: bool) -> I
         if not len(rows):
             yield f"no run of {name}"
             continue
-        ends = sorted({*rows.stop_reason} - {"plugged"})
-        if ends:
+        if ends := sorted({*rows.stop_reason} - {"plugged"}):
             yield f"{name} ended by {', '.join(ends)}"
         if rows.max_overlap.max() > OVERLAP:
-            most = f"{rows.max_overlap.max():.0%}"
-            yield f"fines of {name} overlap by up to {most} of a diameter"
+            yield f"fines of {name} overlap by up to {rows.max_overlap.max():.0%} of a diameter"
         passed, inside = int(rows.passed_count.sum()), int(rows.invaded_count.sum())
         if deep and passed > PASSED * (inside + passed):
-            share = f"{passed / (inside + passed):.0%}"
-            yield f"{share} of the fines passed through {name}, so they went deeper still"
+            share = passed / (inside + passed)
+            yield f"{share:.0%} of the fines passed through {name}, so they went deeper still"

@@ -18,18 +18,10 @@ from fdnet.report.figures import BLUE, GREEN, GREY, ORANGE, draw
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from validation.picture import with_few_colours
 from validation.thesis import published as known
+from validation.thesis import quantities
 from validation.thesis.compare import QUANTITIES, values_of
 from validation.thesis.published import reductions, specimen_of, thesis_of
-from validation.thesis.quantities import (
-    FIELDS,
-    POROSITY,
-    WHOLE,
-    Run,
-    fines_in_class,
-    first_section,
-    measure,
-    weighted,
-)
+from validation.thesis.quantities import POROSITY, WHOLE, Run, first_section, measure, weighted
 from validation.thesis.runs import points
 
 COLOURS = ("", BLUE, GREEN, ORANGE, "#56B4E9", "#E69F00", "#000000", "#CC79A7", GREY)
@@ -168,7 +160,11 @@ def _density(axes: Any, panel: Any, sources: Sources) -> list[str]:
     for (name, between), one in known.statistics_of(specimen).items():
         if name in names or (names[0] == POROSITY and "throats with" in name):
             ours = np.mean([measure(section, name, between)[0] for section in sections])
-            span = f" {between[0]:g}–{between[1]:g} {FIELDS[name][0]}".rstrip() if between else ""
+            span = (
+                f" {between[0]:g}–{between[1]:g} {quantities.FIELDS[name][0]}".rstrip()
+                if between
+                else ""
+            )
             given = f"{one['sense']} {100 * one['value']:g} %".replace("exact ", "")
             lines.append(f"{name}{span}: {100 * ours:.2g} % (thesis {given})")
     return lines
@@ -177,7 +173,9 @@ def _density(axes: Any, panel: Any, sources: Sources) -> list[str]:
 def _distances(panel: Any, sources: Sources) -> Array:
     between = (float(panel.names[0]), float(panel.names[1]))
     sections = [first_section(run, WHOLE) for run in sources.runs[panel.specimens[0]]]
-    return np.concatenate([fines_in_class(one, between)["distance"] for one in sections])
+    return np.concatenate(
+        [quantities.fines_in_class(one, between)["distance"] for one in sections]
+    )
 
 
 def _distance(axes: Any, panel: Any, sources: Sources) -> list[str]:
@@ -200,9 +198,7 @@ def _distance(axes: Any, panel: Any, sources: Sources) -> list[str]:
 
 def _sections(every: Any, panel: Any, sources: Sources) -> None:
     """k / k0 of sections by the thesis's laws (above) and fdnet's (below), and in the thesis."""
-    for axes, laws, words in zip(
-        every, ("thesis", "own"), ("the thesis's", "fdnet's"), strict=True
-    ):
+    for axes, laws in zip(every, ("thesis", "own"), strict=True):
         for specimen in panel.specimens:
             runs, style = sources.runs[specimen], _style(sources.runs[specimen])
             slabs = [getattr(run, laws).sections for run in runs]
@@ -218,7 +214,8 @@ def _sections(every: Any, panel: Any, sources: Sources) -> None:
                 axes.plot(np.arange(len(given)) + 0.5, given, **mark)
         axes.plot([], [], ":", color=GREY, label="in place")
         axes.set(xlim=(0, edges[-1]), ylim=(0, 1.05))
-        axes.set_title(f"by {words} laws", fontsize=9, loc="left")
+        title = "by the thesis's laws" if laws == "thesis" else "by fdnet's laws"
+        axes.set_title(title, fontsize=9, loc="left")
 
 
 def _bars(axes: Any, panel: Any, sources: Sources) -> None:
@@ -304,15 +301,13 @@ def _paint(axes: Any, spheres: Snapshot, *, by_size: bool) -> None:
 def _spheres(axes: Any, panel: Any, sources: Sources) -> list[str]:
     """The pack, a slab of the invaded pack, or the invaded fines by size."""
     run, what = sources.runs[panel.specimens[0]][0], panel.names[0]
-    fines, words = run.state.damaged.fines(), f"{run.thesis.invaded_count:,} invaded fines"
     if what == "pack":
-        spheres, words = run.state.grains, f"{len(run.state.grains):,} grains"
-    elif what == "slab":
-        spheres = middle_slab(run.state.damaged)
-    else:
-        spheres = fines.where(fines.position[:, 0] >= fines.box[0, 0])
-    _paint(axes, spheres, by_size=what == "sizes")
-    return [words]
+        _paint(axes, run.state.grains, by_size=False)
+        return [f"{len(run.state.grains):,} grains"]
+    fines, slab = run.state.damaged.fines(), middle_slab(run.state.damaged)
+    inside = fines.where(fines.position[:, 0] >= fines.box[0, 0])
+    _paint(axes, slab if what == "slab" else inside, by_size=what == "sizes")
+    return [f"{run.thesis.invaded_count:,} invaded fines"]
 
 
 _ALL = (_depth, _density, _distance, _bars, _spheres)

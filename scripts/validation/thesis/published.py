@@ -12,7 +12,6 @@ from typing import Any
 import pandas as pd
 
 TABLE3 = "table3"
-SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 Between = tuple[float, float] | None
 """(low, high) of a range [low, high); None for a quantity itself."""
 

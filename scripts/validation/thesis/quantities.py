@@ -1,7 +1,7 @@
 """What is measured on each run, and on its first millimetre.
 
-RUN holds numbers of a whole run, FIELDS sizes of each pore or throat of the first millimetre,
-SINGLES numbers of that section, which the thesis examines in section 3.3 (Shi 2011).
+FIELDS holds sizes of each pore or throat of the first millimetre, SINGLES numbers of that
+section, which the thesis examines in section 3.3 (Shi 2011).
 """
 
 import math
@@ -18,14 +18,7 @@ from fdnet.network.laws.damage import CLOGGING, DEPOSITION
 from fdnet.network.network import Network
 from fdnet.network.permeability import Analysis, compare
 from fdnet.spheres.snapshot import Array
-from validation.thesis.published import (
-    Between,
-    key_of,
-    published,
-    reductions,
-    statistics_of,
-    thesis_of,
-)
+from validation.thesis import published as known
 from validation.thesis.runs import Planned, State
 
 MM, SECTIONS = 1e-3, 8
@@ -49,17 +42,10 @@ class Run:
 
 
 def examine(item: Planned, state: State) -> Run:
-    """Analyse a state with the sections and bins of its case.
-
-    Raises NetworkError on degenerate geometry, FlowError on a solve that fails its checks.
-    """
-    thesis, own = compare(
-        state.grains,
-        state.damaged,
-        periodic=state.case.periodic,
-        options=state.case.analysis,
-        laws=[("thesis", "thesis"), (DEFAULT_LAW, ALL_SPHERES)],
-    )
+    """Analyse a state with the sections and bins of its case."""
+    laws = [("thesis", "thesis"), (DEFAULT_LAW, ALL_SPHERES)]
+    how: Any = {"periodic": state.case.periodic, "options": state.case.analysis}
+    thesis, own = compare(state.grains, state.damaged, laws=laws, **how)
     return Run(item=item, state=state, thesis=thesis, own=own)
 
 
@@ -73,11 +59,10 @@ def share(part: Array, weights: Any = 1.0) -> float:
 # ---- Numbers of a whole run: results.csv.
 def deep_near_wall(run: Run) -> float:
     """Share of the fines beyond 1 mm centred within a mean grain radius of a side wall."""
-    (low, high), *sides = run.state.damaged.box
-    place = run.state.damaged.fines().position
-    place = place[(place[:, 0] >= low + MM) & (place[:, 0] < high)]
-    to_wall = [np.minimum(place[:, i] - a, b - place[:, i]) for i, (a, b) in enumerate(sides, 1)]
-    near = np.minimum(*to_wall) < run.state.case.grains.mean_radius_m
+    box, place = run.state.damaged.box, run.state.damaged.fines().position
+    place = place[(place[:, 0] >= box[0, 0] + MM) & (place[:, 0] < box[0, 1])]
+    to_wall = np.minimum(place - box[:, 0], box[:, 1] - place)[:, 1:].min(axis=1)
+    near = to_wall < run.state.case.grains.mean_radius_m
     return math.nan if any(run.state.case.periodic) else share(near)
 
 
@@ -92,8 +77,8 @@ def result_rows(run: Run) -> list[dict[str, Any]]:
 
 
 def _row(run: Run, a: Analysis) -> dict[str, Any]:
-    depth, end, told = run.depth, run.state.ending, thesis_of(run.item.id)
-    known = {} if run.item.group == "quick" else told
+    depth, end, told = run.depth, run.state.ending, known.thesis_of(run.item.id)
+    counts = {} if run.item.group == "quick" else told
     inplace = [reduction(one.k_initial_inplace, one.k_damaged_inplace) for one in a.sections]
     first = a.sections[0]
     return {
@@ -131,12 +116,12 @@ def _row(run: Run, a: Analysis) -> dict[str, Any]:
         "max_overlap": float(end["max_overlap"]),
         "thesis_damaged_porosity": told.get("damaged_porosity", [math.nan])[0],
         "thesis_depth_mm": float(told.get("invaded_depth_mm", math.nan)),
-        "thesis_invaded_count": float(known.get("invaded_count", math.nan)),
-        **_numbered("thesis_k_reduction", reductions(told)),
+        "thesis_invaded_count": float(counts.get("invaded_count", math.nan)),
+        **_numbered("thesis_k_reduction", known.reductions(told)),
         "thesis_fraction_first_bin": told.get("fraction_first_bin", math.nan),
         "thesis_fraction_beyond_0p5mm": told.get("fraction_beyond_0p5mm", math.nan),
         "thesis_face_porosity_loss": told.get("face_porosity_loss", math.nan),
-        "thesis_count_first_mm": float(known.get("count_first_mm", math.nan)),
+        "thesis_count_first_mm": float(counts.get("count_first_mm", math.nan)),
     }
 
 
@@ -250,12 +235,11 @@ def _free_of_throats(section: Section) -> float:
 
 def _mean_porosity(section: Section) -> float:
     values, weights = weighted(section, POROSITY)
-    return float(np.average(values, weights=weights)) if weights.any() else math.nan
+    return float(np.average(values, weights=weights))
 
 
 def _in_throats(section: Section) -> float:
-    both = _filled(section, "throat") + _filled(section, "pore")
-    return _filled(section, "throat") / both if both > 0 else math.nan
+    return _filled(section, "throat") / (_filled(section, "throat") + _filled(section, "pore"))
 
 
 SINGLES: Mapping[str, tuple[str, Callable[[Section], float]]] = {
@@ -276,7 +260,7 @@ SINGLES: Mapping[str, tuple[str, Callable[[Section], float]]] = {
 """Numbers of a section, with their units."""
 
 
-def measure(section: Section, quantity: str, between: Between) -> tuple[float, str]:
+def measure(section: Section, quantity: str, between: known.Between) -> tuple[float, str]:
     """One of SINGLES with its unit, or the share of one of FIELDS in a range."""
     if between is None:
         unit, value = SINGLES[quantity]
@@ -291,25 +275,18 @@ def statistics(run: Run) -> Iterator[dict[str, Any]]:
     Each is measured by the readings WHOLE and CUT. Rows of the section's grains tessellated alone,
     the thesis's own reading, were made by an earlier script.
     """
-    wanted = dict.fromkeys(key_of(one) for one in published()["statistic"])
+    wanted = dict.fromkeys(known.key_of(one) for one in known.published()["statistic"])
     for reading in (WHOLE, CUT):
         section = first_section(run, reading)
         for quantity, between in wanted:
             words, (ours, unit) = quantity, measure(section, quantity, between)
             if between is not None:
                 words += f" {between[0]:g} to {between[1]:g} {FIELDS[quantity][0]}"
-            one = statistics_of(run.item.id).get((quantity, between), {})
-            yield {
-                "id": run.item.id,
-                "seed": run.item.seed,
-                "source": one.get("source", ""),
-                "quantity": words.strip(),
-                "ours": ours,
-                "thesis": one.get("value", math.nan),
-                "sense": one.get("sense", ""),
-                "unit": unit,
-                "note": f"{reading}; {one['note']}" if one.get("note") else reading,
-            }
+            one = known.statistics_of(run.item.id).get((quantity, between), {})
+            row = {"id": run.item.id, "seed": run.item.seed, "source": one.get("source", "")}
+            row |= {"quantity": words.strip(), "ours": ours, "thesis": one.get("value", math.nan)}
+            row |= {"sense": one.get("sense", ""), "unit": unit}
+            yield row | {"note": "; ".join(filter(None, (reading, one.get("note"))))}
 
 
 # ---- Where fines sit in throats (Shi 2011, Figures 56 and 57): deposition.csv.
@@ -335,8 +312,8 @@ def deposition(run: Run) -> Iterator[dict[str, Any]]:
     independent, which fines of one throat are not quite.
     """
     section = first_section(run, WHOLE)
-    for claim in published()["deposition"]:
-        reported = claim if run.item.name.startswith("specimen5") else {}
+    for claim in known.published()["deposition"]:
+        told = claim if run.item.name.startswith("specimen5") else {}
         fines = fines_in_class(section, claim["throat_porosity"])
         near, far = fines["distance"] < 0.5, fines["distance"] > 1.0
         parts = {"nearer_axis": near, "nearer_wall": ~near & ~far, "beyond_wall": far}
@@ -347,21 +324,11 @@ def deposition(run: Run) -> Iterator[dict[str, Any]]:
         wall, low, high = 1.0 - shares["nearer_axis"], math.nan, math.nan
         if total:  # Wilson 1927, J. Am. Stat. Assoc. 22, 209
             low, high = binomtest(round(wall * total), int(total)).proportion_ci(method="wilson")
-        yield {
-            "id": run.item.id,
-            "seed": run.item.seed,
-            "low": claim["throat_porosity"][0],
-            "high": claim["throat_porosity"][1],
-            "whole": True,
-            "throats": float(np.sum(section.weight["throat"][np.unique(fines["throat"])])),
-            "fines": total,
-            **shares,
-            "wall_low": low,
-            "wall_high": high,
-            "law": "" if not total else DEPOSITION if wall > 0.5 else CLOGGING,
-            "decided": low > 0.5 or high < 0.5,
-            "nearer": reported.get("nearer", ""),
-            "thesis": reported.get("value", math.nan),
-            "sense": reported.get("sense", ""),
-            "source": claim["source"],
-        }
+        row = dict(zip(("low", "high"), claim["throat_porosity"], strict=True)) | {"whole": True}
+        row["throats"] = float(np.sum(section.weight["throat"][np.unique(fines["throat"])]))
+        row |= {"fines": total, **shares, "wall_low": low, "wall_high": high}
+        row["law"] = "" if not total else DEPOSITION if wall > 0.5 else CLOGGING
+        row |= {"decided": low > 0.5 or high < 0.5, "nearer": told.get("nearer", "")}
+        row |= {"thesis": told.get("value", math.nan), "sense": told.get("sense", "")}
+        row = {"id": run.item.id, "seed": run.item.seed, **row}
+        yield row | {"source": claim["source"]}

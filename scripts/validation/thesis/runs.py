@@ -3,11 +3,8 @@
 import json
 import re
 import tomllib
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +13,10 @@ import tomli_w
 
 import fdnet
 from fdnet.case.case import InvasionCase, with_fines
-from fdnet.case.file import case_from, case_path, read_case
+from fdnet.case.file import case_from, case_path, read_case, set_keys
 from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError
-from fdnet.files import write_bytes, write_text
+from fdnet.files import replacing, write_text
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from validation.thesis.published import TABLE3, rows_in
 
@@ -58,8 +55,8 @@ class Planned:
 
     def load(self) -> InvasionCase:
         """Its case."""
-        settings = [f"seed={self.seed}", *self.settings]
-        return with_fines(read_case(case_path(self.name), assignments=settings))
+        seed = f"seed={self.seed}"
+        return with_fines(read_case(case_path(self.name), assignments=[seed, *self.settings]))
 
 
 def points() -> list[Planned]:
@@ -72,7 +69,7 @@ def planned(*, quick: bool = False) -> list[Planned]:
     """All runs, each once, or with `quick` one run of each quick form."""
     if quick:
         return [one for one in points() if one.group == "quick" and one.seed == 1]
-    runs: dict[tuple[str, int], Planned] = {}
+    runs = dict[tuple[str, int], Planned]()
     for one in points():
         runs.setdefault((one.id, one.seed), one)
     return [*runs.values()]
@@ -101,7 +98,7 @@ def make_runs(plan: Sequence[Planned], states: Path, runs: Path, *, jobs: int) -
     for (group, seeds, *settings), items in sweeps.items():
         name = re.sub(r"[^\w.-]|_", "-", "-".join([group, *map(str, seeds), *settings]))
         cases = [str(case_path(one)) for one in dict.fromkeys(i.name for i in items.values())]
-        keys = {key: _value(text) for key, _, text in (one.partition("=") for one in settings)}
+        keys = set_keys({}, settings)
         sweep = {"name": name, "cases": cases, "seeds": [*seeds], "set": keys}
         file = write_text(runs / f"{name}.toml", tomli_w.dumps(sweep))
         stages = ("pack", "invade", "analyse")
@@ -115,14 +112,6 @@ def make_runs(plan: Sequence[Planned], states: Path, runs: Path, *, jobs: int) -
             if state.case.digest() in items:
                 write_state(states / items[state.case.digest()].file, state)
     return failed
-
-
-def _value(text: str) -> Any:
-    """A setting's value, as TOML reads it; a text without quotes as it is."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
 
 
 # ---- The states.
@@ -160,22 +149,17 @@ def write_state(path: Path, state: State) -> None:
         arrays[f"{name}_place"] = place.astype(np.float32)
         arrays[f"{name}_kind"] = spheres.kind.astype(np.uint8)
         arrays[f"{name}_id"] = spheres.id.astype(np.uint32)
-    buffer = BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    write_bytes(path, buffer.getvalue())
+    with replacing(path) as part:
+        np.savez_compressed(part, allow_pickle=False, **arrays)
 
 
 def read_state(path: Path) -> State:
-    """A state that `write_state` kept. Raises CaseError when the file is none."""
-    try:
-        with np.load(path) as file:
-            arrays = dict(file)
-        text = json.loads(arrays["text"].tobytes())
-        case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
-        grains, damaged = (_spheres(arrays, name, case) for name in ("grains", "damaged"))
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        advice = "remove it and run the study anew"
-        raise CaseError(f"{path}: is no kept state ({error}); {advice}") from error
+    """A state that `write_state` kept."""
+    with np.load(path) as file:
+        arrays = dict(file)
+    text = json.loads(arrays["text"].tobytes())
+    case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
+    grains, damaged = (_spheres(arrays, name, case) for name in ("grains", "damaged"))
     return State(case=case, grains=grains, damaged=damaged, ending=text["ending"])
 
 
@@ -186,14 +170,13 @@ def find_state(states: Path, item: Planned) -> State | None:
     """
     case = item.load()
     twin = replace(item, name=item.name.replace(TABLE3, "specimen7"))
-    for path in (states / item.file, states / twin.file):
-        if path.exists():
-            state = read_state(path)
-            if state.case.digest("invade") == case.digest("invade"):
-                return replace(state, case=case)
-            if path.name == item.file:
-                what = f"is the state of another case than {item.id}"
-                raise CaseError(f"{path}: {what}; remove it to run the case anew")
+    for path in filter(Path.exists, (states / item.file, states / twin.file)):
+        state = read_state(path)
+        if state.case.digest("invade") == case.digest("invade"):
+            return replace(state, case=case)
+        if path.name == item.file:
+            what = f"is the state of another case than {item.id}"
+            raise CaseError(f"{path}: {what}; remove it to run the case anew")
     return None
 
 
