@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from fdnet.campaign import plan as plans
 from fdnet.campaign import result as results
 from fdnet.campaign.engine import HowToRun, run_missing
-from fdnet.campaign.page import Compared, compared, write_comparison
+from fdnet.campaign.page import Compared, write_comparison
 from fdnet.campaign.plan import Plan
 from fdnet.campaign.result import RANKED_BY, Comparison
 from fdnet.case.case import Case
@@ -23,25 +23,17 @@ from fdnet.run.records import RunOptions, cores
 from fdnet.statistics.bands import seeds_for_width, student_band
 
 
-def ensemble(
-    case: Case | str | Path,
-    *,
-    out: str | Path,
-    seeds: int = 4,
-    until: str | None = None,
-    max_seeds: int = 32,
-    **how: Any,
-) -> Compared:
+def ensemble(case: Case | str | Path, *, out: str | Path, seeds: int = 4, **how: Any) -> Compared:
     """Run one case with several seeds, from its own seed on.
 
     Args:
         case: a `Case`, or the path of a case file.
         out: folder of the results; a second call runs only what is missing in it.
         seeds: number of seeds.
-        until: how narrow a band is to be, as "k_reduction ± 5 %"; seeds are added until it is.
-        max_seeds: most seeds that `until` may spend.
-        how: `jobs` at the same time, `ranks` of each, `stages`, `liggghts`, `launcher`, `timeout`
-            (s), `engine` ("local" or "snakemake"), `ranked_by`, `progress` and `jobs_limit`.
+        how: `until`, how narrow a band is to be, as "k_reduction ± 5 %", for which seeds are
+            added up to `max_seeds` (32); `jobs` at the same time, `ranks` of each, `stages`,
+            `liggghts`, `launcher`, `timeout` (s), `engine` ("local" or "snakemake"), `ranked_by`,
+            `progress` and `jobs_limit`.
 
     Returns:
         Means with their 95 % bands, and the table of all runs; lengths in m, k in m2.
@@ -57,17 +49,10 @@ def ensemble(
         fdnet.errors.CaseError: seeds: 0, expected 1 or more, ...
     """
     given = case if isinstance(case, Case) else read_case(case)
-    return _carried_out(partial(plans.ensemble_plan, given, seeds), out, until, max_seeds, **how)
+    return _carried_out(partial(plans.ensemble_plan, given, seeds), out, **how)
 
 
-def sweep(
-    path: str | Path,
-    *,
-    out: str | Path,
-    until: str | None = None,
-    max_seeds: int = 32,
-    **how: Any,
-) -> Compared:
+def sweep(path: str | Path, *, out: str | Path, **how: Any) -> Compared:
     """Run every combination of the sweep file at `path`, and compare the variants.
 
     The other arguments, results (in SI: m, m2) and errors are those of `ensemble`.
@@ -78,7 +63,7 @@ def sweep(
         Traceback (most recent call last):
         fdnet.errors.CaseError: no-such-sweep.toml: cannot be read as a sweep file: ...
     """
-    return _carried_out(partial(plans.sweep_plan, path), out, until, max_seeds, **how)
+    return _carried_out(partial(plans.sweep_plan, path), out, **how)
 
 
 def compare_runs(
@@ -126,12 +111,12 @@ def open_runs(runs: str | Path | Sequence[str | Path], *, ranked_by: str = RANKE
         folder = expanded(runs)
         plan = plans.kept_plan(folder) if folder.is_dir() and not is_run_folder(folder) else None
         if plan is not None:
-            return compared(results.gather_plan(folder, plan, ranked_by=ranked_by))
+            return Compared(results.gather_plan(folder, plan, ranked_by=ranked_by))
         within = sorted(folder.iterdir()) if folder.is_dir() else []
         folders, out = [one for one in within if is_run_folder(one)] or [folder], folder
     else:
         folders, out = [expanded(run) for run in runs], Path()
-    return compared(results.gather_runs(folders, out, ranked_by=ranked_by))
+    return Compared(results.gather_runs(folders, out, ranked_by=ranked_by))
 
 
 def gathered(runs: Sequence[Path], out: Path, ranked_by: str) -> Comparison:
@@ -148,9 +133,9 @@ def gathered(runs: Sequence[Path], out: Path, ranked_by: str) -> Comparison:
 def _carried_out(
     plan_of: Callable[..., Plan],
     out: str | Path,
-    until: str | None,
-    max_seeds: int,
     *,
+    until: str | None = None,
+    max_seeds: int = 32,
     ranked_by: str = RANKED_BY,
     jobs: int | None = None,
     ranks: int = 1,
@@ -160,12 +145,10 @@ def _carried_out(
     **how: Any,
 ) -> Compared:
     plan = plan_of(limit=jobs_limit, ranks=ranks, stages=tuple(stages))
-    running = HowToRun(
-        jobs=max(1, cores() // ranks) if jobs is None else jobs, quiet=not progress, **how
-    )
-    return write_comparison(
-        carry_out(expanded(out), plan, running, until, ranked_by, most_seeds=max_seeds)
-    )
+    jobs = max(1, cores() // ranks) if jobs is None else jobs
+    running, folder = HowToRun(jobs=jobs, quiet=not progress, **how), expanded(out)
+    made = carry_out(folder, plan, running, until, ranked_by, most_seeds=max_seeds)
+    return write_comparison(made)
 
 
 # ---- From a plan to its comparison.

@@ -1,10 +1,11 @@
 """What a reader sees of a comparison: sentences, figures, and compare.html with both."""
 
+import json
 import math
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib import metadata
 from pathlib import Path
@@ -30,7 +31,7 @@ LAYERS += ["fines_count"]
 """Quantities of the tables by depth."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Compared:
     """Runs and what they say together; `print` gives a sentence for each variant and each two.
 
@@ -39,15 +40,33 @@ class Compared:
 
     Attributes:
         comparison: the runs themselves.
-        summary: `runs`, `failed`, and by quantity `mean`, `low` and `high`.
-        ranking: a sentence for each variant, best first.
-        differences: a sentence for each two variants.
+        limits: the targets of a sweep, SI.
     """
 
     comparison: Comparison
-    summary: Mapping[str, Any]
-    ranking: tuple[str, ...]
-    differences: tuple[str, ...]
+    limits: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def muds(self) -> "tuple[Candidate, ...]":
+        """The variants against the targets, best first; none without targets."""
+        return tuple(candidates(self.comparison, self.limits))
+
+    @cached_property
+    def summary(self) -> Mapping[str, Any]:
+        """`runs`, `failed`, and by quantity `mean`, `low` and `high`."""
+        states = [{"name": mud.name, "state": mud.state} for mud in self.muds]
+        more = {"candidates": states, "targets": self.limits} if self.limits else {}
+        return results.summary_of(self.comparison, more)
+
+    @cached_property
+    def ranking(self) -> tuple[str, ...]:
+        """A sentence for each variant, best first, by the targets and by their quantity."""
+        return (*(mud.line for mud in self.muds), *ranking_lines(self.comparison))
+
+    @cached_property
+    def differences(self) -> tuple[str, ...]:
+        """A sentence for each two variants."""
+        return tuple(pair_lines(self.comparison))
 
     @property
     def path(self) -> Path:
@@ -95,18 +114,16 @@ def write_comparison(
     comparison: Comparison, limits: Mapping[str, float] | None = None
 ) -> Compared:
     """Write table.csv, summary.json, figures and compare.html; `limits` (SI) are of targets."""
+    made = Compared(comparison, limits or {})
     results.write_table(comparison)
-    muds, made = candidates(comparison, limits or {}), compared(comparison)
-    states = [{"name": mud.name, "state": mud.state} for mud in muds]
-    more = {"candidates": states, "targets": limits} if limits else {}
-    summary = results.write_summary(comparison, more)
-    judged = [mud.line for mud in muds]
+    write_text(made.path / results.SUMMARY, json.dumps(made.summary, indent=1) + "\n")
+    judged = [mud.line for mud in made.muds]
     text = html.page_text(
         "campaign/compare.html.j2",
         comparison=comparison,
         answer=judged[0].removeprefix("1. ") if judged else answer_words(comparison),
         by="the targets" if judged else f"{label(comparison.ranked_by)}, smallest first",
-        ranking=[re.sub(r"^\d+\. ", "", line) for line in judged or made.ranking],
+        ranking=[re.sub(r"^\d+\. ", "", line) for line in made.ranking[: len(judged) or None]],
         pairs=made.differences,
         figures=_draw(comparison),
         columns=_shown(comparison),
@@ -115,11 +132,11 @@ def write_comparison(
         label=label,
         value_text=value_text,
         ends_text=ends_text,
-        link=partial(_link, comparison.path),
+        link=partial(_link, made.path),
         version=metadata.version("fdnet"),
     )
-    write_text(comparison.path / results.PAGE, text)
-    return replace(made, summary=summary, ranking=(*judged, *made.ranking))
+    write_text(made.path / results.PAGE, text)
+    return made
 
 
 def _shown(comparison: Comparison) -> list[str]:
@@ -131,16 +148,6 @@ def _shown(comparison: Comparison) -> list[str]:
 def _link(page: Path, run: results.Entry) -> str:
     report = run.folder / "report.html"
     return quote(os.path.relpath(report if report.exists() else run.folder, page))
-
-
-def compared(comparison: Comparison) -> Compared:
-    """What runs say together, with nothing written."""
-    return Compared(
-        comparison=comparison,
-        summary=results.summary_of(comparison, {}),
-        ranking=tuple(ranking_lines(comparison)),
-        differences=tuple(pair_lines(comparison)),
-    )
 
 
 # ---- Sentences.
@@ -160,25 +167,27 @@ LABELS = {
 """Quantities of a summary in words."""
 
 
-_K = re.compile(r"(?<!_m3)_m2$")
-
-
 def label(quantity: str) -> str:
     """A quantity in words; its key where it has none."""
     return LABELS.get(quantity, quantity)
+
+
+def _unit_of(quantity: str) -> tuple[float, str]:
+    """Factor from SI to the unit that a reader sees, and this unit."""
+    if results.SHARES.search(quantity):
+        return 100.0, "%"
+    if re.search(r"(?<!_m3)_m2$", quantity):
+        return 1 / MILLIDARCY, "mD"
+    return (1e3, "mm") if quantity.endswith("_m") else (1.0, "–")
 
 
 def value_text(quantity: str, value: float | None) -> str:
     """A value for a reader, with its unit, as the report of a run has it."""
     if value is None or math.isnan(value):
         return html.DASH
-    if results.SHARES.search(quantity):
-        text = f"{percent(value)} %"
-    elif _K.search(quantity):
-        text = f"{in_millidarcy(value)} mD"
-    else:
-        text = millimetres(value) if quantity.endswith("_m") else html.quantity(value)
-    return re.sub("^-", "\u2212", text)
+    _, unit = _unit_of(quantity)
+    worded = {"%": percent, "mD": in_millidarcy, "mm": millimetres, "–": html.quantity}[unit]
+    return re.sub("^-", "\u2212", worded(value) + (f" {unit}" if unit in ("%", "mD") else ""))
 
 
 def ends_text(quantity: str, band: Band) -> str:
@@ -241,9 +250,13 @@ def pair_lines(comparison: Comparison) -> list[str]:
 
 def failure_lines(comparison: Comparison) -> list[str]:
     """Each run that has no result, with its reason and folder."""
-    failed = comparison.failed
-    lines = [f"{one.name} {one.status}: {one.reason} (folder {one.folder})" for one in failed]
-    return [*lines, *(f"{one}: has no result and is left out" for one in comparison.left_out)]
+    return [
+        *(
+            f"{one.name} {one.status}: {one.reason} (folder {one.folder})"
+            for one in comparison.failed
+        ),
+        *(f"{one}: has no result and is left out" for one in comparison.left_out),
+    ]
 
 
 HEADS = {"met": "meets every target", "open": "may meet its targets", "missed": "misses a target"}
@@ -284,10 +297,6 @@ def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[Cand
 
 
 # ---- Figures, as SVG inside of the page.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5A5A5A", "#8C564B")
-"""The palette of Okabe and Ito (2008), which readers with any colour vision can tell apart."""
-
-
 def _draw(comparison: Comparison) -> dict[str, dict[str, str]]:
     """The figures that have data, drawn into the folder of the page, by the stem of their file."""
     shown, several = dict[str, dict[str, str]](), len(comparison.variants) > 1
@@ -300,7 +309,11 @@ def _draw(comparison: Comparison) -> dict[str, dict[str, str]]:
         caption = "Every run (grey), mean over the seeds (line) and its 95 % band (blue)."
         add("ranking", _fill_ranking, caption)
     if "sections.1.k_damaged_inplace_m2" in comparison.numbers:
-        more = f", of {len(COLOURS)} variants at most" if several else "; thin lines are the runs"
+        more = (
+            f", of {len(figures.PALETTE)} variants at most"
+            if several
+            else "; thin lines are the runs"
+        )
         caption = (
             "Permeability in place of the slabs after the invasion, mean over the seeds with its "
             f"95 % band; dashed is the intact sand{more}."
@@ -331,7 +344,7 @@ def _fill_depth(figure: Any, *, comparison: Comparison) -> None:
     """Permeability in place of the slabs by depth, of the first variants of the ranking."""
     axes, table = figure.subplots(), results.depth_table(comparison)
     runs = comparison.done if len(comparison.variants) == 1 else []
-    for colour, name in zip(COLOURS, comparison.ranking(), strict=False):
+    for colour, name in zip(figures.PALETTE, comparison.ranking(), strict=False):
         mine = table[table["variant"] == name]
         if not len(mine):
             continue
@@ -352,15 +365,6 @@ def _fill_depth(figure: Any, *, comparison: Comparison) -> None:
     axes.set(xlabel=figures.DEPTH_LABEL, ylabel="permeability in place (mD)", ylim=(0, None))
     axes.yaxis.set_major_formatter("{x:,.10g}")
     figures.legend_above(axes, columns=2)
-
-
-def _unit_of(quantity: str) -> tuple[float, str]:
-    """Factor from SI to the unit that a figure has, and this unit."""
-    if results.SHARES.search(quantity):
-        return 100.0, "%"
-    if _K.search(quantity):
-        return 1 / MILLIDARCY, "mD"
-    return (1e3, "mm") if quantity.endswith("_m") else (1.0, "–")
 
 
 def _short(name: str) -> str:

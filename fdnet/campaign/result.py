@@ -16,7 +16,7 @@ from fdnet.campaign.plan import PACKS, RUNS, Plan, label_of, read_plan_record, s
 from fdnet.case.case import Case
 from fdnet.case.units import converted, share_of
 from fdnet.errors import CaseError
-from fdnet.files import replacing, write_text
+from fdnet.files import replacing
 from fdnet.report.tables import read_summary
 from fdnet.run.folder import MANIFEST, check_finished, is_run_folder, read_record
 from fdnet.run.records import stage_costs
@@ -252,8 +252,7 @@ def _folders(run: Path, left_out: list[str]) -> Iterator[Path]:
 
 
 def _numbers_of(folder: Path) -> dict[str, Any]:
-    """Every number of a summary by dotted key, with a few texts: `sections.1.k_damaged_m2`, the
-    length of a list of sentences, and the share of the fines that passed."""
+    """Every number of a summary by dotted key, with a few texts and the share that passed."""
     summary = read_summary(folder / SUMMARY)
     flat = {key: value for key, value in _flat("", summary) if key != "seed"}
     supplied = summary["supplied_count"]
@@ -261,6 +260,7 @@ def _numbers_of(folder: Path) -> dict[str, Any]:
 
 
 def _flat(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """`sections.1.k_damaged_m2` and so on; of a list of sentences their number."""
     if isinstance(value, list):
         if not any(isinstance(one, Mapping) for one in value):
             yield prefix, len(value)
@@ -292,23 +292,19 @@ def _variant_names(cases: Sequence[str], varied: Sequence[Mapping[str, Any]]) ->
 
 # ---- table.csv and summary.json.
 def _rows(comparison: Comparison) -> list[dict[str, Any]]:
-    return [
-        {
-            "run": entry.name,
-            "variant": entry.variant,
-            **dict.fromkeys(comparison.keys),
-            **{
-                k: json.dumps(v) if isinstance(v, list | Mapping) else v
-                for k, v in entry.keys.items()
-            },
-            "seed": entry.seed,
-            "status": entry.status,
-            "reason": entry.reason,
-            "folder": os.path.relpath(entry.folder, comparison.path),
-            **entry.numbers,
-        }
-        for entry in comparison.entries
-    ]
+    rows = []
+    for one in comparison.entries:
+        varied = dict.fromkeys(comparison.keys)
+        for key, value in one.keys.items():
+            varied[key] = json.dumps(value) if isinstance(value, list | Mapping) else value
+        row = {"run": one.name, "variant": one.variant, **varied, "seed": one.seed}
+        row |= {"status": one.status, "reason": one.reason}
+        rows.append(row | {"folder": _relative(comparison, one), **one.numbers})
+    return rows
+
+
+def _relative(comparison: Comparison, run: Entry) -> str:
+    return os.path.relpath(run.folder, comparison.path)
 
 
 def run_table(comparison: Comparison) -> "pd.DataFrame":
@@ -363,18 +359,11 @@ def write_table(comparison: Comparison) -> None:
         table.to_csv(part, index=False, lineterminator="\n")
 
 
-def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Write summary.json, with `more` keys."""
-    result = summary_of(comparison, more)
-    write_text(comparison.path / SUMMARY, json.dumps(result, indent=1) + "\n")
-    return result
-
-
 def summary_of(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
     """Means over seeds and variants, and of each variant, with `more` keys, as JSON knows them."""
     failures = [
         {"run": one.name, "status": one.status, "reason": one.reason}
-        | {"folder": os.path.relpath(one.folder, comparison.path)}
+        | {"folder": _relative(comparison, one)}
         for one in comparison.failed
     ]
     result: dict[str, Any] = {
@@ -394,8 +383,7 @@ def summary_of(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any
         band, seeds = comparison.overall(quantity)
         result.setdefault(quantity, _band_row(band) | {"seeds": seeds})
     text = json.dumps(result | dict(more), default=str)
-    plain: dict[str, Any] = json.loads(text, parse_constant=lambda _: None)
-    return plain
+    return dict(json.loads(text, parse_constant=lambda _: None))
 
 
 def _variant_row(comparison: Comparison, name: str) -> dict[str, Any]:
