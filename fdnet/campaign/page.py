@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from fdnet.campaign import result as results
@@ -47,21 +47,21 @@ class Compared:
     limits: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
-    def muds(self) -> "tuple[Candidate, ...]":
-        """The variants against the targets, best first; none without targets."""
-        return tuple(candidates(self.comparison, self.limits))
-
-    @cached_property
     def summary(self) -> Mapping[str, Any]:
         """`runs`, `failed`, and by quantity `mean`, `low` and `high`."""
-        states = [{"name": mud.name, "state": mud.state} for mud in self.muds]
-        more = {"candidates": states, "targets": self.limits} if self.limits else {}
+        judged = [{"name": name, "state": state} for name, state, _ in self.candidates]
+        more = {"candidates": judged, "targets": self.limits} if self.limits else {}
         return results.summary_of(self.comparison, more)
+
+    @cached_property
+    def candidates(self) -> list[tuple[str, str, str]]:
+        """Name, state and a sentence of each variant against the targets, best first."""
+        return candidates(self.comparison, self.limits)
 
     @cached_property
     def ranking(self) -> tuple[str, ...]:
         """A sentence for each variant, best first, by the targets and by their quantity."""
-        return (*(mud.line for mud in self.muds), *ranking_lines(self.comparison))
+        return (*(line for *_, line in self.candidates), *ranking_lines(self.comparison))
 
     @cached_property
     def differences(self) -> tuple[str, ...]:
@@ -105,7 +105,8 @@ class Compared:
         for quantity in _shown(self.comparison)[1:] if len(variants) == 1 else ():
             band = self.comparison.band(variants[0], quantity)
             more.append(f"{label(quantity)}: {band_text(quantity, band)}")
-        return "\n".join([*self.ranking, *more, *self.differences])
+        fast = filter(None, [method_words(self.comparison)])
+        return "\n".join([*self.ranking, *more, *self.differences, *fast])
 
     __repr__ = __str__
 
@@ -117,11 +118,12 @@ def write_comparison(
     made = Compared(comparison, limits or {})
     results.write_table(comparison)
     write_text(made.path / results.SUMMARY, json.dumps(made.summary, indent=1) + "\n")
-    judged = [mud.line for mud in made.muds]
+    judged = [line for *_, line in made.candidates]
     text = html.page_text(
         "campaign/compare.html.j2",
         comparison=comparison,
         answer=judged[0].removeprefix("1. ") if judged else answer_words(comparison),
+        method=method_words(comparison),
         by="the targets" if judged else f"{label(comparison.ranked_by)}, smallest first",
         ranking=[re.sub(r"^\d+\. ", "", line) for line in made.ranking[: len(judged) or None]],
         pairs=made.differences,
@@ -207,20 +209,23 @@ def band_text(quantity: str, band: Band) -> str:
 
 def answer_words(comparison: Comparison) -> str:
     """What the seeds say together: the mean of one variant, or the best and who is as good."""
-    first, *others = ranking_lines(comparison)
-    if not others:
-        return first
-    best = comparison.ranking()[0]
-    pairs = [pair for pair in comparison.pairs() if pair.one == best]
+    first = ranking_lines(comparison)[0].removeprefix("1. ")
+    pairs = [pair for pair in comparison.pairs() if pair.one == comparison.ranking()[0]]
     alike = [pair.other for pair in pairs if not pair.apart]
-    said = f"{first.removeprefix('1. ')} "
     if not alike:
-        return said + "It is the smallest, and differs from every other variant." * bool(pairs)
+        return first + " It is the smallest, and differs from every other variant." * bool(pairs)
     more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
-    return (
-        f"{said}It is the smallest mean, but these seeds do not tell it apart from "
-        f"{', '.join(alike[:3])}{more}."
-    )
+    said = "It is the smallest mean, but these seeds do not tell it apart from"
+    return f"{first} {said} {', '.join(alike[:3])}{more}."
+
+
+def method_words(comparison: Comparison) -> str:
+    """Which runs are by the fast model, and its error; "" where none is."""
+    from fdnet.run.by_classes import METHOD_ERROR
+
+    fast = sum(run.numbers.get("method") == "network" for run in comparison.done)
+    which = "All" if fast == len(comparison.done) else f"{fast} of {len(comparison.done)}"
+    return f"{which} runs are by the fast model of size classes: {METHOD_ERROR}." if fast else ""
 
 
 def ranking_lines(comparison: Comparison) -> list[str]:
@@ -263,16 +268,9 @@ HEADS = {"met": "meets every target", "open": "may meet its targets", "missed": 
 """The 95 % band lies below the limit, across it, or above it."""
 
 
-class Candidate(NamedTuple):
-    """A mud, the worst of its states against the targets, and a sentence with the reasons."""
-
-    name: str
-    state: str
-    line: str
-
-
-def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[Candidate]:
-    """The muds by their states: all met first, then by the mean nearest to its limit."""
+def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[tuple[str, str, str]]:
+    """Name, worst state and reasons of each mud: all met first, then by the mean nearest to its
+    limit."""
     states, rows = list(HEADS), []
     for name in filter(comparison.of_variant, comparison.variants if limits else ()):
         reasons, worst, over = [], 0, -math.inf
@@ -291,7 +289,7 @@ def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[Cand
             reasons.append(reason)
         rows.append((worst, over, name, "; ".join(reasons)))
     return [
-        Candidate(name, states[worst], f"{number}. {name} {HEADS[states[worst]]}: {reasons}.")
+        (name, states[worst], f"{number}. {name} {HEADS[states[worst]]}: {reasons}.")
         for number, (worst, _, name, reasons) in enumerate(sorted(rows), start=1)
     ]
 
