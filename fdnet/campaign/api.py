@@ -1,36 +1,28 @@
-"""Ensembles, sweeps and comparisons: run what is missing, gather, add seeds until it is enough."""
+"""Ensembles, sweeps and comparisons: run what is missing, and gather."""
 
-import re
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from fdnet.campaign import plan as plans
 from fdnet.campaign import result as results
 from fdnet.campaign.engine import HowToRun, run_missing
-from fdnet.campaign.page import Compared, compared, write_comparison
+from fdnet.campaign.page import Compared, write_comparison
 from fdnet.campaign.plan import Plan
 from fdnet.campaign.result import RANKED_BY, Comparison
 from fdnet.case.case import Case
-from fdnet.case.file import read_case
-from fdnet.errors import CaseError, FdnetError
+from fdnet.case.file import case_from, put_keys, read_case
+from fdnet.errors import FdnetError
 from fdnet.files import expanded
 from fdnet.names import STAGES
 from fdnet.run.folder import is_run_folder
 from fdnet.run.pipeline import refuse
 from fdnet.run.records import RunOptions, cores
-from fdnet.statistics.bands import seeds_for_width, student_band
 
 
 def ensemble(
-    case: Case | str | Path,
-    *,
-    out: str | Path,
-    seeds: int = 4,
-    until: str | None = None,
-    max_seeds: int = 32,
-    **how: Any,
+    case: Case | str | Path, *, out: str | Path, seeds: int = 4, fast: bool = False, **how: Any
 ) -> Compared:
     """Run one case with several seeds, from its own seed on.
 
@@ -38,8 +30,7 @@ def ensemble(
         case: a `Case`, or the path of a case file.
         out: folder of the results; a second call runs only what is missing in it.
         seeds: number of seeds.
-        until: how narrow a band is to be, as "k_reduction ± 5 %"; seeds are added until it is.
-        max_seeds: most seeds that `until` may spend.
+        fast: by the fast model (`invasion.method = "network"`).
         how: `jobs` at the same time, `ranks` of each, `stages`, `liggghts`, `launcher`, `timeout`
             (s), `engine` ("local" or "snakemake"), `ranked_by`, `progress` and `jobs_limit`.
 
@@ -56,18 +47,13 @@ def ensemble(
         Traceback (most recent call last):
         fdnet.errors.CaseError: seeds: 0, expected 1 or more, ...
     """
-    given = case if isinstance(case, Case) else read_case(case)
-    return _carried_out(partial(plans.ensemble_plan, given, seeds), out, until, max_seeds, **how)
+    given = case if isinstance(case, Case) else read_case(case, values=plans.FAST if fast else {})
+    if fast and given is case:
+        given = case_from(put_keys(dict(given.data()), plans.FAST))
+    return _carried_out(partial(plans.ensemble_plan, given, seeds), out, **how)
 
 
-def sweep(
-    path: str | Path,
-    *,
-    out: str | Path,
-    until: str | None = None,
-    max_seeds: int = 32,
-    **how: Any,
-) -> Compared:
+def sweep(path: str | Path, *, out: str | Path, fast: bool = False, **how: Any) -> Compared:
     """Run every combination of the sweep file at `path`, and compare the variants.
 
     The other arguments, results (in SI: m, m2) and errors are those of `ensemble`.
@@ -78,7 +64,7 @@ def sweep(
         Traceback (most recent call last):
         fdnet.errors.CaseError: no-such-sweep.toml: cannot be read as a sweep file: ...
     """
-    return _carried_out(partial(plans.sweep_plan, path), out, until, max_seeds, **how)
+    return _carried_out(partial(plans.sweep_plan, path, fast=fast), out, **how)
 
 
 def compare_runs(
@@ -122,16 +108,15 @@ def open_runs(runs: str | Path | Sequence[str | Path], *, ranked_by: str = RANKE
         >>> runs.by_depth().columns[:4].tolist()
         ['variant', 'section', 'x_lo_m', 'x_hi_m']
     """
-    if isinstance(runs, str | Path):
-        folder = expanded(runs)
-        plan = plans.kept_plan(folder) if folder.is_dir() and not is_run_folder(folder) else None
-        if plan is not None:
-            return compared(results.gather_plan(folder, plan, ranked_by=ranked_by))
-        within = sorted(folder.iterdir()) if folder.is_dir() else []
-        folders, out = [one for one in within if is_run_folder(one)] or [folder], folder
-    else:
+    if not isinstance(runs, str | Path):
         folders, out = [expanded(run) for run in runs], Path()
-    return compared(results.gather_runs(folders, out, ranked_by=ranked_by))
+        return Compared(results.gather_runs(folders, out, ranked_by=ranked_by))
+    out = expanded(runs)
+    plan = plans.kept_plan(out) if out.is_dir() and not is_run_folder(out) else None
+    if plan is not None:
+        return Compared(results.gather_plan(out, plan, ranked_by=ranked_by))
+    within = [one for one in sorted(out.glob("*")) if is_run_folder(one)]
+    return Compared(results.gather_runs(within or [out], out, ranked_by=ranked_by))
 
 
 def gathered(runs: Sequence[Path], out: Path, ranked_by: str) -> Comparison:
@@ -148,8 +133,6 @@ def gathered(runs: Sequence[Path], out: Path, ranked_by: str) -> Comparison:
 def _carried_out(
     plan_of: Callable[..., Plan],
     out: str | Path,
-    until: str | None,
-    max_seeds: int,
     *,
     ranked_by: str = RANKED_BY,
     jobs: int | None = None,
@@ -160,81 +143,23 @@ def _carried_out(
     **how: Any,
 ) -> Compared:
     plan = plan_of(limit=jobs_limit, ranks=ranks, stages=tuple(stages))
-    running = HowToRun(
-        jobs=max(1, cores() // ranks) if jobs is None else jobs, quiet=not progress, **how
-    )
-    return write_comparison(
-        carry_out(expanded(out), plan, running, until, ranked_by, most_seeds=max_seeds)
-    )
+    jobs = max(1, cores() // ranks) if jobs is None else jobs
+    running, folder = HowToRun(jobs=jobs, quiet=not progress, **how), expanded(out)
+    return write_comparison(carry_out(folder, plan, running, ranked_by))
 
 
 # ---- From a plan to its comparison.
-FEWEST = 3
-"""Seeds before a band is believed."""
-_UNTIL = re.compile(r"\s*([\w.]+)\s*(?:±|\+-|\+/-)\s*(\d*\.?\d+(?:[eE][+-]?\d+)?)\s*(%?)\s*")
-
-
-class Until(NamedTuple):
-    """How narrow the 95 % band of a quantity is to be: half of it, over the mean if `relative`,
-    else in the quantity's unit."""
-
-    quantity: str
-    half_width: float
-    relative: bool
-
-    def allowed(self, values: Sequence[float]) -> float:
-        """Half-width that is narrow enough, in the quantity's unit."""
-        return self.half_width * (abs(sum(values) / len(values)) if self.relative else 1.0)
-
-
-def parse_until(text: str) -> Until:
-    """The goal that `--until` gives. Raises CaseError for anything else.
-
-    Percent of a share (k_reduction, a porosity) are points: 45 % ± 5 % is 40 to 50 %. Percent of
-    any other quantity are of its mean. Without percent the number has the quantity's unit.
-    """
-    match = _UNTIL.fullmatch(text)
-    if match is None or not 0 < (width := float(match[2])) < float("inf"):
-        wanted = "a quantity and the half of its band, e.g. 'k_reduction ± 5 %'"
-        raise CaseError(f"--until {text!r}: expected {wanted} or 'k_damaged_m2 +- 10 %'")
-    percent = match[3] == "%"
-    relative = percent and results.SHARES.search(match[1]) is None
-    return Until(match[1], width / 100 if percent else width, relative)
-
-
 def carry_out(
-    path: Path,
-    plan: Plan,
-    how: HowToRun,
-    until: str | None,
-    ranked_by: str,
-    *,
-    most_seeds: int = 32,
-    run: bool = True,
+    path: Path, plan: Plan, how: HowToRun, ranked_by: str, *, run: bool = True
 ) -> Comparison:
-    """Run what is missing of the plan in the folder `path`; returns the comparison.
-
-    With `until`, seeds are added, at most `most_seeds`. Without `run` it gathers what is there.
-    Raises CaseError, for an unknown quantity, and the error of the first variant where none can
-    be run, before anything is written.
-    """
-    goal = None if until is None else parse_until(until)
+    """Run what is missing of the plan in the folder `path`, or with `run` false nothing; returns
+    the comparison. Raises the error of the first variant where none can be run."""
     if run:
         _refuse_hopeless(path, plan, how)
     with plans.campaign_folder(path, plan) as (held, lock):
-        while True:
-            if run:
-                run_missing(path, held, how, lock)
-            comparison = results.gather_plan(path, held, ranked_by=ranked_by)
-            more = 0
-            if goal is not None and run and comparison.done:
-                results.refuse_unknown(comparison, goal.quantity, "--until")
-                more = _seeds_to_add(goal, comparison, len(held.seeds), most_seeds)
-            if not more:
-                return comparison
-            how.say(f"{len(held.seeds)} seeds are not enough yet; {more} more")
-            first = max(held.seeds) + 1
-            held = plans.extended(path, held, range(first, first + more))
+        if run:
+            run_missing(path, held, how, lock)
+        return results.gather_plan(path, held, ranked_by=ranked_by)
 
 
 def _refuse_hopeless(path: Path, plan: Plan, how: HowToRun) -> None:
@@ -249,16 +174,3 @@ def _refuse_hopeless(path: Path, plan: Plan, how: HowToRun) -> None:
         except FdnetError as error:
             errors.append(error)
     raise errors[0]
-
-
-def _seeds_to_add(until: Until, comparison: Comparison, have: int, most: int) -> int:
-    """Seeds that the whole bands, not cut at their bounds, still ask for; at most twice as many,
-    because a spread of few seeds is itself uncertain."""
-    needed = 0
-    for name in comparison.variants:
-        values = list(comparison.values(name, until.quantity).values())
-        if 0 < len(values) < FEWEST:
-            needed = max(needed, have + FEWEST - len(values))
-        elif values and student_band(values).half_width > until.allowed(values):
-            needed = max(needed, seeds_for_width(values, until.allowed(values), most), have + 1)
-    return max(0, min(most, needed, 2 * have) - have)

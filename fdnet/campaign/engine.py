@@ -30,7 +30,6 @@ from fdnet.run.progress import ONE_CORE
 
 PAUSE, PATIENCE = 0.05, 120.0
 """Seconds between two looks at the runs, and seconds that they may take to stop in good order."""
-ENGINES = ("local", "snakemake", "slurm")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,8 +37,7 @@ class HowToRun:
     """How runs are carried out: `jobs` at the same time, each stopped after `timeout` seconds.
 
     The engine is "local", "snakemake" or "slurm" (Snakemake with its executor for Slurm, which
-    gets `resources`, as "slurm_partition=short"). Where `liggghts` is None it is looked for, and
-    the launcher of several ranks is mpirun. `quiet` shows no progress.
+    gets `resources`, as "slurm_partition=short"). LIGGGHTS is looked for where None is given.
     """
 
     jobs: int
@@ -51,10 +49,11 @@ class HowToRun:
     quiet: bool = False
 
     def __post_init__(self) -> None:
+        engines = ("local", "snakemake", "slurm")
         if self.jobs < 1:
             raise CaseError(f"jobs: {self.jobs} runs at the same time, expected at least 1")
-        if self.engine not in ENGINES:
-            raise CaseError(f"engine: {self.engine!r}, expected one of {', '.join(ENGINES)}")
+        if self.engine not in engines:
+            raise CaseError(f"engine: {self.engine!r}, expected one of {', '.join(engines)}")
 
     @property
     def options(self) -> list[str]:
@@ -149,22 +148,13 @@ def _log(path: Path, name: str) -> Path:
 
 def _start(words: Sequence[str], path: Path, log: Path, **more: Any) -> subprocess.Popen:
     """A process of one thread in a session of its own, which works in `path`."""
+    streams: Any = {"stdin": subprocess.DEVNULL, "stderr": subprocess.STDOUT}
+    own: Any = {"cwd": path, "env": os.environ | ONE_CORE, "start_new_session": True}
     with log.open("wb") as file:
-        return subprocess.Popen(
-            words,
-            cwd=path,
-            stdin=subprocess.DEVNULL,
-            stdout=file,
-            stderr=subprocess.STDOUT,
-            env=os.environ | ONE_CORE,
-            start_new_session=True,
-            **more,
-        )
+        return subprocess.Popen(words, stdout=file, **streams, **own, **more)
 
 
-def _stop(
-    running: Iterable[subprocess.Popen], kill: Callable[[int, int], None], number: int
-) -> None:
+def _stop(running: Iterable[subprocess.Popen], kill: Callable[..., None], number: int) -> None:
     """End these processes by a signal in good order, after PATIENCE by SIGKILL."""
     deadline = time.monotonic() + PATIENCE
     open_still = [process for process in running if process.poll() is None]
@@ -214,9 +204,9 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> Non
     finally:
         _stop(running.values(), os.kill, signal.SIGTERM)
     if full and waiting:
+        advice = "free space, then repeat the command, which runs only what is missing"
         raise CaseError(
-            f"{path}: the disk is full; {len(waiting)} jobs were not started: free space, then "
-            "repeat the command, which runs only what is missing"
+            f"{path}: the disk is full; {len(waiting)} jobs were not started: {advice}"
         )
 
 
@@ -267,10 +257,8 @@ def _run_snakemake(
     if process.returncode and not any(last_words(_log(path, task.name)) for task in tasks):
         lines = _REASON.findall(log.read_text("utf-8", "replace"))
         reasons = " | ".join(dict.fromkeys(line.strip() for line in lines))[:1000]
-        raise CaseError(
-            f"{log}: Snakemake ended with exit code {process.returncode} before any run: "
-            f"{reasons or last_words(log)}"
-        )
+        problem = f"Snakemake ended with exit code {process.returncode} before any run"
+        raise CaseError(f"{log}: {problem}: {reasons or last_words(log)}")
 
 
 def _snakemake_words(how: HowToRun, plan: Plan) -> list[str]:
@@ -287,10 +275,7 @@ def _snakemake_words(how: HowToRun, plan: Plan) -> list[str]:
 
 
 def _quoted(resource: str) -> str:
-    """A resource for Snakemake, which reads it as Python: texts are quoted, `all` is no function.
-
-    Raises CaseError for one that is no name with a printable value.
-    """
+    """A resource for Snakemake, which reads it as Python: `all` shall be no function."""
     name, _, value = resource.partition("=")
     if not name.isidentifier() or not value.isprintable() or not value:
         raise CaseError(f"--slurm: {resource!r}, expected e.g. slurm_partition=short,runtime=60")

@@ -1,14 +1,15 @@
 """What a reader sees of a comparison: sentences, figures, and compare.html with both."""
 
+import json
 import math
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from fdnet.campaign import result as results
@@ -30,7 +31,7 @@ LAYERS += ["fines_count"]
 """Quantities of the tables by depth."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Compared:
     """Runs and what they say together; `print` gives a sentence for each variant and each two.
 
@@ -39,15 +40,33 @@ class Compared:
 
     Attributes:
         comparison: the runs themselves.
-        summary: `runs`, `failed`, and by quantity `mean`, `low` and `high`.
-        ranking: a sentence for each variant, best first.
-        differences: a sentence for each two variants.
+        limits: the targets of a sweep, SI.
     """
 
     comparison: Comparison
-    summary: Mapping[str, Any]
-    ranking: tuple[str, ...]
-    differences: tuple[str, ...]
+    limits: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def summary(self) -> Mapping[str, Any]:
+        """`runs`, `failed`, and by quantity `mean`, `low` and `high`."""
+        judged = [{"name": name, "state": state} for name, state, _ in self.candidates]
+        more = {"candidates": judged, "targets": self.limits} if self.limits else {}
+        return results.summary_of(self.comparison, more)
+
+    @cached_property
+    def candidates(self) -> list[tuple[str, str, str]]:
+        """Name, state and a sentence of each variant against the targets, best first."""
+        return candidates(self.comparison, self.limits)
+
+    @cached_property
+    def ranking(self) -> tuple[str, ...]:
+        """A sentence for each variant, best first, by the targets and by their quantity."""
+        return (*(line for *_, line in self.candidates), *ranking_lines(self.comparison))
+
+    @cached_property
+    def differences(self) -> tuple[str, ...]:
+        """A sentence for each two variants."""
+        return tuple(pair_lines(self.comparison))
 
     @property
     def path(self) -> Path:
@@ -86,7 +105,8 @@ class Compared:
         for quantity in _shown(self.comparison)[1:] if len(variants) == 1 else ():
             band = self.comparison.band(variants[0], quantity)
             more.append(f"{label(quantity)}: {band_text(quantity, band)}")
-        return "\n".join([*self.ranking, *more, *self.differences])
+        fast = filter(None, [method_words(self.comparison)])
+        return "\n".join([*self.ranking, *more, *self.differences, *fast])
 
     __repr__ = __str__
 
@@ -95,18 +115,17 @@ def write_comparison(
     comparison: Comparison, limits: Mapping[str, float] | None = None
 ) -> Compared:
     """Write table.csv, summary.json, figures and compare.html; `limits` (SI) are of targets."""
+    made = Compared(comparison, limits or {})
     results.write_table(comparison)
-    muds, made = candidates(comparison, limits or {}), compared(comparison)
-    states = [{"name": mud.name, "state": mud.state} for mud in muds]
-    more = {"candidates": states, "targets": limits} if limits else {}
-    summary = results.write_summary(comparison, more)
-    judged = [mud.line for mud in muds]
+    write_text(made.path / results.SUMMARY, json.dumps(made.summary, indent=1) + "\n")
+    judged = [line for *_, line in made.candidates]
     text = html.page_text(
         "campaign/compare.html.j2",
         comparison=comparison,
         answer=judged[0].removeprefix("1. ") if judged else answer_words(comparison),
+        method=method_words(comparison),
         by="the targets" if judged else f"{label(comparison.ranked_by)}, smallest first",
-        ranking=[re.sub(r"^\d+\. ", "", line) for line in judged or made.ranking],
+        ranking=[re.sub(r"^\d+\. ", "", line) for line in made.ranking[: len(judged) or None]],
         pairs=made.differences,
         figures=_draw(comparison),
         columns=_shown(comparison),
@@ -115,11 +134,11 @@ def write_comparison(
         label=label,
         value_text=value_text,
         ends_text=ends_text,
-        link=partial(_link, comparison.path),
+        link=partial(_link, made.path),
         version=metadata.version("fdnet"),
     )
-    write_text(comparison.path / results.PAGE, text)
-    return replace(made, summary=summary, ranking=(*judged, *made.ranking))
+    write_text(made.path / results.PAGE, text)
+    return made
 
 
 def _shown(comparison: Comparison) -> list[str]:
@@ -131,16 +150,6 @@ def _shown(comparison: Comparison) -> list[str]:
 def _link(page: Path, run: results.Entry) -> str:
     report = run.folder / "report.html"
     return quote(os.path.relpath(report if report.exists() else run.folder, page))
-
-
-def compared(comparison: Comparison) -> Compared:
-    """What runs say together, with nothing written."""
-    return Compared(
-        comparison=comparison,
-        summary=results.summary_of(comparison, {}),
-        ranking=tuple(ranking_lines(comparison)),
-        differences=tuple(pair_lines(comparison)),
-    )
 
 
 # ---- Sentences.
@@ -160,25 +169,27 @@ LABELS = {
 """Quantities of a summary in words."""
 
 
-_K = re.compile(r"(?<!_m3)_m2$")
-
-
 def label(quantity: str) -> str:
     """A quantity in words; its key where it has none."""
     return LABELS.get(quantity, quantity)
+
+
+def _unit_of(quantity: str) -> tuple[float, str]:
+    """Factor from SI to the unit that a reader sees, and this unit."""
+    if results.SHARES.search(quantity):
+        return 100.0, "%"
+    if re.search(r"(?<!_m3)_m2$", quantity):
+        return 1 / MILLIDARCY, "mD"
+    return (1e3, "mm") if quantity.endswith("_m") else (1.0, "–")
 
 
 def value_text(quantity: str, value: float | None) -> str:
     """A value for a reader, with its unit, as the report of a run has it."""
     if value is None or math.isnan(value):
         return html.DASH
-    if results.SHARES.search(quantity):
-        text = f"{percent(value)} %"
-    elif _K.search(quantity):
-        text = f"{in_millidarcy(value)} mD"
-    else:
-        text = millimetres(value) if quantity.endswith("_m") else html.quantity(value)
-    return re.sub("^-", "\u2212", text)
+    _, unit = _unit_of(quantity)
+    worded = {"%": percent, "mD": in_millidarcy, "mm": millimetres, "–": html.quantity}[unit]
+    return re.sub("^-", "\u2212", worded(value) + (f" {unit}" if unit in ("%", "mD") else ""))
 
 
 def ends_text(quantity: str, band: Band) -> str:
@@ -198,20 +209,23 @@ def band_text(quantity: str, band: Band) -> str:
 
 def answer_words(comparison: Comparison) -> str:
     """What the seeds say together: the mean of one variant, or the best and who is as good."""
-    first, *others = ranking_lines(comparison)
-    if not others:
-        return first
-    best = comparison.ranking()[0]
-    pairs = [pair for pair in comparison.pairs() if pair.one == best]
+    first = ranking_lines(comparison)[0].removeprefix("1. ")
+    pairs = [pair for pair in comparison.pairs() if pair.one == comparison.ranking()[0]]
     alike = [pair.other for pair in pairs if not pair.apart]
-    said = f"{first.removeprefix('1. ')} "
     if not alike:
-        return said + "It is the smallest, and differs from every other variant." * bool(pairs)
+        return first + " It is the smallest, and differs from every other variant." * bool(pairs)
     more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
-    return (
-        f"{said}It is the smallest mean, but these seeds do not tell it apart from "
-        f"{', '.join(alike[:3])}{more}."
-    )
+    said = "It is the smallest mean, but these seeds do not tell it apart from"
+    return f"{first} {said} {', '.join(alike[:3])}{more}."
+
+
+def method_words(comparison: Comparison) -> str:
+    """Which runs are by the fast model, and its error; "" where none is."""
+    from fdnet.run.by_classes import METHOD_ERROR
+
+    fast = sum(run.numbers.get("method") == "network" for run in comparison.done)
+    which = "All" if fast == len(comparison.done) else f"{fast} of {len(comparison.done)}"
+    return f"{which} runs are by the fast model of size classes: {METHOD_ERROR}." if fast else ""
 
 
 def ranking_lines(comparison: Comparison) -> list[str]:
@@ -241,25 +255,22 @@ def pair_lines(comparison: Comparison) -> list[str]:
 
 def failure_lines(comparison: Comparison) -> list[str]:
     """Each run that has no result, with its reason and folder."""
-    failed = comparison.failed
-    lines = [f"{one.name} {one.status}: {one.reason} (folder {one.folder})" for one in failed]
-    return [*lines, *(f"{one}: has no result and is left out" for one in comparison.left_out)]
+    return [
+        *(
+            f"{one.name} {one.status}: {one.reason} (folder {one.folder})"
+            for one in comparison.failed
+        ),
+        *(f"{one}: has no result and is left out" for one in comparison.left_out),
+    ]
 
 
 HEADS = {"met": "meets every target", "open": "may meet its targets", "missed": "misses a target"}
 """The 95 % band lies below the limit, across it, or above it."""
 
 
-class Candidate(NamedTuple):
-    """A mud, the worst of its states against the targets, and a sentence with the reasons."""
-
-    name: str
-    state: str
-    line: str
-
-
-def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[Candidate]:
-    """The muds by their states: all met first, then by the mean nearest to its limit."""
+def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[tuple[str, str, str]]:
+    """Name, worst state and reasons of each mud: all met first, then by the mean nearest to its
+    limit."""
     states, rows = list(HEADS), []
     for name in filter(comparison.of_variant, comparison.variants if limits else ()):
         reasons, worst, over = [], 0, -math.inf
@@ -278,16 +289,12 @@ def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[Cand
             reasons.append(reason)
         rows.append((worst, over, name, "; ".join(reasons)))
     return [
-        Candidate(name, states[worst], f"{number}. {name} {HEADS[states[worst]]}: {reasons}.")
+        (name, states[worst], f"{number}. {name} {HEADS[states[worst]]}: {reasons}.")
         for number, (worst, _, name, reasons) in enumerate(sorted(rows), start=1)
     ]
 
 
 # ---- Figures, as SVG inside of the page.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#5A5A5A", "#8C564B")
-"""The palette of Okabe and Ito (2008), which readers with any colour vision can tell apart."""
-
-
 def _draw(comparison: Comparison) -> dict[str, dict[str, str]]:
     """The figures that have data, drawn into the folder of the page, by the stem of their file."""
     shown, several = dict[str, dict[str, str]](), len(comparison.variants) > 1
@@ -300,7 +307,11 @@ def _draw(comparison: Comparison) -> dict[str, dict[str, str]]:
         caption = "Every run (grey), mean over the seeds (line) and its 95 % band (blue)."
         add("ranking", _fill_ranking, caption)
     if "sections.1.k_damaged_inplace_m2" in comparison.numbers:
-        more = f", of {len(COLOURS)} variants at most" if several else "; thin lines are the runs"
+        more = (
+            f", of {len(figures.PALETTE)} variants at most"
+            if several
+            else "; thin lines are the runs"
+        )
         caption = (
             "Permeability in place of the slabs after the invasion, mean over the seeds with its "
             f"95 % band; dashed is the intact sand{more}."
@@ -331,7 +342,7 @@ def _fill_depth(figure: Any, *, comparison: Comparison) -> None:
     """Permeability in place of the slabs by depth, of the first variants of the ranking."""
     axes, table = figure.subplots(), results.depth_table(comparison)
     runs = comparison.done if len(comparison.variants) == 1 else []
-    for colour, name in zip(COLOURS, comparison.ranking(), strict=False):
+    for colour, name in zip(figures.PALETTE, comparison.ranking(), strict=False):
         mine = table[table["variant"] == name]
         if not len(mine):
             continue
@@ -352,15 +363,6 @@ def _fill_depth(figure: Any, *, comparison: Comparison) -> None:
     axes.set(xlabel=figures.DEPTH_LABEL, ylabel="permeability in place (mD)", ylim=(0, None))
     axes.yaxis.set_major_formatter("{x:,.10g}")
     figures.legend_above(axes, columns=2)
-
-
-def _unit_of(quantity: str) -> tuple[float, str]:
-    """Factor from SI to the unit that a figure has, and this unit."""
-    if results.SHARES.search(quantity):
-        return 100.0, "%"
-    if _K.search(quantity):
-        return 1 / MILLIDARCY, "mD"
-    return (1e3, "mm") if quantity.endswith("_m") else (1.0, "–")
 
 
 def _short(name: str) -> str:

@@ -30,6 +30,8 @@ from fdnet.scales.scales import scales_of
 
 MOST_JOBS = 1000
 """Most runs of a plan that are accepted without a word of confirmation."""
+FAST = {"invasion.method": "network"}
+"""The keys of the fast model."""
 
 
 # ---- The plan: which cases are run with which seeds, frozen before the first run.
@@ -98,11 +100,9 @@ def ensemble_plan(case: Case, seeds: int, *, limit: int = MOST_JOBS, **more: Any
 
 
 def _refuse_many(variants: int, seeds: int, limit: int) -> None:
-    if variants * seeds > limit:
-        raise CaseError(
-            f"{variants} variants with {seeds} seeds are {variants * seeds:,} runs, more than "
-            f"{limit:,}; give fewer values, or confirm with --jobs-limit {variants * seeds}"
-        )
+    if (runs := variants * seeds) > limit:
+        problem = f"{variants} variants with {seeds} seeds are {runs:,} runs, more than {limit:,}"
+        raise CaseError(f"{problem}; give fewer values, or confirm with --jobs-limit {runs}")
 
 
 def _named(variants: Sequence[Variant]) -> tuple[Variant, ...]:
@@ -136,9 +136,8 @@ def _dotted(table: Any) -> Any:
 
 
 def _varied(keys: Mapping[str, Any]) -> Mapping[str, Any]:
-    advice = {"seed": "give seeds = ...", "name": "the runs get names of their own"}
-    for key in keys.keys() & advice.keys():
-        raise ValueError(f"{key} cannot be varied; {advice[key]}")
+    for key in keys.keys() & {"seed", "name"}:
+        raise ValueError(f"{key} cannot be varied; give seeds = ..., and runs have own names")
     return keys
 
 
@@ -199,11 +198,9 @@ def plan_lines(plan: Plan) -> Iterator[str]:
         whole += seconds * len(plan.seeds)
         gone = [text for text in scales.warnings if text.kind == "sizes-left-out"]
         yield "; ".join([f"{one.name}: {spoken_time(seconds)} a run", *gone])
-    several = len(set(plan.packs.values()))
-    yield (
-        f"{len(plan.jobs)} runs: {spoken_time(whole)} on one idle core, within a factor of 2; "
-        f"{several or 'no'} packs of grains serve several runs"
-    )
+    several = f"{len(set(plan.packs.values())) or 'no'} packs of grains serve several runs"
+    time = f"{spoken_time(whole)} on one idle core, within a factor of 2"
+    yield f"{len(plan.jobs)} runs: {time}; {several}"
 
 
 def label_of(keys: Mapping[str, Any]) -> str:
@@ -211,7 +208,9 @@ def label_of(keys: Mapping[str, Any]) -> str:
     return "+".join(f"{key.rsplit('.', 1)[-1]}={value}" for key, value in keys.items())
 
 
-def sweep_plan(path: str | Path, *, limit: int = MOST_JOBS, **more: Any) -> Plan:
+def sweep_plan(
+    path: str | Path, *, fast: bool = False, limit: int = MOST_JOBS, **more: Any
+) -> Plan:
     """Every combination of the sweep file at `path`, each a checked case.
 
     The paths of cases are relative to the file. Raises CaseError for what is wrong in it, for
@@ -232,9 +231,11 @@ def sweep_plan(path: str | Path, *, limit: int = MOST_JOBS, **more: Any) -> Plan
     ):
         swept = dict(zip(file.grid, values, strict=True))
         keys = {**own, **swept}
+        if fast and FAST.keys() & keys:
+            raise CaseError(f"{path}: varies invasion.method; leave --fast out")
         label = "+".join(filter(None, (name, label_of(swept))))
         try:
-            case = read_case(case_path, values={**file.set, **keys})
+            case = read_case(case_path, values=file.set | keys | (FAST if fast else {}))
         except CaseError as error:
             problems.append(f"{label}: {error}" if label else str(error))
             continue
@@ -259,12 +260,10 @@ def _problem(item: Any) -> str:
 
 # ---- The folder of a campaign: one plan, and the case of each of its runs.
 PLAN, CASES, RUNS, PACKS, LOGS, LOCK = "plan.json", "cases", "runs", "packs", "logs", ".lock"
-_Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9=+_-][A-Za-z0-9.=+_-]*$")]
-_Seed = Annotated[int, Field(ge=0, lt=2**31)]
 
 
 class _Row(JsonObject):
-    name: _Name
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9=+_-][A-Za-z0-9.=+_-]*$")]
     keys: Mapping[str, Any] = {}
 
 
@@ -272,9 +271,9 @@ class _PlanRecord(JsonObject):
     fdnet_campaign: Literal[1]
     name: str
     digest: str
-    seeds: Annotated[list[_Seed], Field(min_length=1)]
-    ranks: Annotated[int, Field(ge=1)] = 1
-    stages: Sequence[str] = STAGES
+    seeds: Annotated[list[Annotated[int, Field(ge=0, lt=2**31)]], Field(min_length=1)]
+    ranks: Annotated[int, Field(ge=1)]
+    stages: list[str]
     variants: Annotated[list[_Row], Field(min_length=1)]
     runs: Annotated[list[_Row], Field(min_length=1)]
 
@@ -290,12 +289,12 @@ def kept_plan(folder: Path) -> Plan | None:
     record = read_plan_record(folder)
     if record is None:
         return None
-    seeds, variants = tuple(record["seeds"]), []
+    variants = []
     for one in record["variants"]:
-        case = read_case(folder / CASES / f"{one['name']}-seed-{seeds[0]}.toml")
+        case = read_case(folder / CASES / f"{one['name']}-seed-{record['seeds'][0]}.toml")
         variants.append(Variant(one["name"], one.get("keys", {}), case))
-    more = {"ranks": record.get("ranks", 1), "stages": tuple(record.get("stages", STAGES))}
-    return Plan(name=record["name"], variants=tuple(variants), seeds=seeds, **more)
+    more: Any = {name: tuple(record[name]) for name in ("seeds", "stages")}
+    return Plan(name=record["name"], variants=tuple(variants), ranks=record["ranks"], **more)
 
 
 def refuse_foreign(path: Path, own: Collection[str], what: str) -> None:
@@ -304,10 +303,8 @@ def refuse_foreign(path: Path, own: Collection[str], what: str) -> None:
     if path.exists() and not path.is_dir():
         raise CaseError(f"{path}: is a file, expected a folder for --out")
     if path.is_dir() and any(child.name not in own for child in path.iterdir()):
-        raise CaseError(
-            f"{path}: is not empty and holds no {what} of fdnet; give another --out (nothing was "
-            "changed)"
-        )
+        problem = f"is not empty and holds no {what} of fdnet"
+        raise CaseError(f"{path}: {problem}; give another --out (nothing was changed)")
 
 
 @contextlib.contextmanager
@@ -324,37 +321,28 @@ def campaign_folder(path: Path, plan: Plan) -> Iterator[tuple[Plan, int]]:
             (path / below).mkdir(parents=True, exist_ok=True)
         file = (path / LOCK).open("r+b" if (path / LOCK).exists() else "w+b", buffering=0)
     except OSError as error:
-        raise CaseError(
-            f"{path}: cannot be made or written: {error.strerror}; give another --out"
-        ) from error
+        problem = f"cannot be made or written: {error.strerror}"
+        raise CaseError(f"{path}: {problem}; give another --out") from error
     with file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             holder = os.pread(file.fileno(), 500, 0).decode("utf-8", "replace")
-            raise CaseError(
-                f"{path}: {holder or 'another fdnet is running jobs here; wait for it'}, or give "
-                "another --out"
-            ) from error
-        yield _admitted(path, plan), file.fileno()
-
-
-def _admitted(path: Path, plan: Plan) -> Plan:
-    record = read_plan_record(path)
-    if record is not None and record["digest"] != plan.digest:
-        names = ", ".join(one["name"] for one in record["variants"][:3])
-        raise CaseError(
-            f"{path}: holds another plan ({record['name']}: {names}...; digest "
-            f"{record['digest']}, this one {plan.digest}); give another --out (nothing was "
-            "changed)"
-        )
-    before = plan.seeds if record is None else tuple(record["seeds"])
-    return extended(path, replace(plan, seeds=before), plan.seeds)
+            problem = holder or "another fdnet is running jobs here; wait for it"
+            raise CaseError(f"{path}: {problem}, or give another --out") from error
+        record = read_plan_record(path) or {"digest": plan.digest, "seeds": plan.seeds}
+        if record["digest"] != plan.digest:
+            names = ", ".join(one["name"] for one in record["variants"][:3])
+            other = f"{record['name']}: {names}...; digest {record['digest']}"
+            problem = f"holds another plan ({other}, this one {plan.digest})"
+            raise CaseError(f"{path}: {problem}; give another --out (nothing was changed)")
+        held = replace(plan, seeds=tuple(record["seeds"]))
+        yield extended(path, held, plan.seeds), file.fileno()
 
 
 def extended(path: Path, plan: Plan, seeds: Sequence[int]) -> Plan:
-    """The plan with further seeds, written to its folder after its cases, which are written only
-    where they change: Snakemake repeats what is older than its case."""
+    """The plan with further seeds, written after its cases, of which those that stay are not
+    written again: Snakemake repeats what is older than its case."""
     plan = replace(plan, seeds=tuple(dict.fromkeys([*plan.seeds, *seeds])))
     packs, rows = plan.packs, []
     for job in plan.jobs:
@@ -392,10 +380,8 @@ def state_of(path: Path, plan: Plan, job: Job) -> State:
     try:
         manifest, case = check_finished(folder)
         if case.digest() != job.case.digest():
-            raise CaseError(
-                f"{folder}: holds the run of another case than the plan has under this name; "
-                "remove the folder, and it is run again"
-            )
+            problem = "holds the run of another case than the plan has under this name"
+            raise CaseError(f"{folder}: {problem}; remove the folder, and it is run again")
         read_summary(folder / "summary.json")
     except CaseError as error:
         return State("failed", str(error))
@@ -405,10 +391,7 @@ def state_of(path: Path, plan: Plan, job: Job) -> State:
 
 def last_words(path: Path) -> str:
     """The last line of a log that says something, without the name of the program."""
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
+    text = path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     errors = [line for line in lines if line.startswith("fdnet: ") and "warning:" not in line]
     return (errors or lines or [""])[-1].removeprefix("fdnet: ")

@@ -16,7 +16,7 @@ from fdnet.campaign.plan import PACKS, RUNS, Plan, label_of, read_plan_record, s
 from fdnet.case.case import Case
 from fdnet.case.units import converted, share_of
 from fdnet.errors import CaseError
-from fdnet.files import replacing, write_text
+from fdnet.files import write_text
 from fdnet.report.tables import read_summary
 from fdnet.run.folder import MANIFEST, check_finished, is_run_folder, read_record
 from fdnet.run.records import processor_seconds
@@ -71,9 +71,9 @@ class Pair(NamedTuple):
 class Comparison:
     """Runs and what they say together, in the folder `path`, by the varied `keys`.
 
-    The entries are all runs, also those that are not done. `left_out` are folders of planned runs
-    that are not among them, for want of a result. The smallest `ranked_by` is first. `packs_s` are
-    processor seconds of the packs that several runs share, which no run counts.
+    The entries are all runs, also those that are not done; `left_out` are folders of planned runs
+    that are not among them. The smallest `ranked_by` is first. `packs_s` are processor seconds of
+    the packs that several runs share, which no run counts.
     """
 
     title: str
@@ -182,16 +182,14 @@ def refuse_unknown(comparison: Comparison, quantity: str, option: str) -> Compar
     """The comparison. Raises CaseError when no finished run has this quantity."""
     names = list(comparison.numbers)
     if names and quantity not in names:
-        near = difflib.get_close_matches(quantity, names, n=3, cutoff=0.3)
-        raise CaseError(
-            f"{option}: {quantity!r} is no number of the summaries; did you mean "
-            f"{', '.join(near) or 'k_reduction'}?"
-        )
+        near = difflib.get_close_matches(quantity, names, n=3, cutoff=0.3) or [RANKED_BY]
+        problem = f"{quantity!r} is no number of the summaries"
+        raise CaseError(f"{option}: {problem}; did you mean {', '.join(near)}?")
     return comparison
 
 
 # ---- Gathering: the runs of a campaign, or run folders of anywhere.
-_TEXTS = ("law", "damage_law_used", "stop_reason")
+_TEXTS = ("law", "damage_law_used", "stop_reason", "method")
 """Texts of a summary that a table shows next to the numbers."""
 
 
@@ -252,8 +250,7 @@ def _folders(run: Path, left_out: list[str]) -> Iterator[Path]:
 
 
 def _numbers_of(folder: Path) -> dict[str, Any]:
-    """Every number of a summary by dotted key, with a few texts: `sections.1.k_damaged_m2`, the
-    length of a list of sentences, and the share of the fines that passed."""
+    """Every number of a summary by dotted key, with a few texts and the share that passed."""
     summary = read_summary(folder / SUMMARY)
     flat = {key: value for key, value in _flat("", summary) if key != "seed"}
     supplied = summary["supplied_count"]
@@ -261,6 +258,7 @@ def _numbers_of(folder: Path) -> dict[str, Any]:
 
 
 def _flat(prefix: str, value: Any) -> Iterator[tuple[str, Any]]:
+    """`sections.1.k_damaged_m2` and so on; of a list of sentences their number."""
     if isinstance(value, list):
         if not any(isinstance(one, Mapping) for one in value):
             yield prefix, len(value)
@@ -292,23 +290,15 @@ def _variant_names(cases: Sequence[str], varied: Sequence[Mapping[str, Any]]) ->
 
 # ---- table.csv and summary.json.
 def _rows(comparison: Comparison) -> list[dict[str, Any]]:
-    return [
-        {
-            "run": entry.name,
-            "variant": entry.variant,
-            **dict.fromkeys(comparison.keys),
-            **{
-                k: json.dumps(v) if isinstance(v, list | Mapping) else v
-                for k, v in entry.keys.items()
-            },
-            "seed": entry.seed,
-            "status": entry.status,
-            "reason": entry.reason,
-            "folder": os.path.relpath(entry.folder, comparison.path),
-            **entry.numbers,
-        }
-        for entry in comparison.entries
-    ]
+    rows = []
+    for one in comparison.entries:
+        varied = dict.fromkeys(comparison.keys)
+        for key, value in one.keys.items():
+            varied[key] = json.dumps(value) if isinstance(value, list | Mapping) else value
+        row = {"run": one.name, "variant": one.variant, **varied, "seed": one.seed}
+        row |= {"status": one.status, "reason": one.reason}
+        rows.append(row | {"folder": os.path.relpath(one.folder, comparison.path), **one.numbers})
+    return rows
 
 
 def run_table(comparison: Comparison) -> "pd.DataFrame":
@@ -324,11 +314,9 @@ def band_table(comparison: Comparison) -> "pd.DataFrame":
     import pandas as pd
 
     rows = [
-        {"variant": name, "quantity": quantity, **_band_row(comparison.band(name, quantity))}
-        | {"seeds": len(comparison.values(name, quantity))}
+        {"variant": name, "quantity": quantity, **row}
         for name in comparison.variants
-        for quantity in comparison.numbers
-        if comparison.values(name, quantity)
+        for quantity, row in _bands_of(comparison, name).items()
     ]
     columns = ["variant", "quantity", "mean", "low", "high", "seeds"]
     index = ["variant", "quantity"] if len(comparison.variants) > 1 else "quantity"
@@ -341,42 +329,31 @@ def depth_table(comparison: Comparison) -> "pd.DataFrame":
     import pandas as pd
 
     rows: dict[tuple[str, int], dict[str, Any]] = {}
-    for quantity in comparison.numbers:
-        slab = SLAB.fullmatch(quantity)
-        for name in comparison.variants if slab else ():
-            if slab and comparison.values(name, quantity):
-                row = rows.setdefault((name, int(slab[1])), {})
-                band = comparison.band(name, quantity)
-                row[slab[2]] = band.mean
+    for name in comparison.variants:
+        for quantity, band in _bands_of(comparison, name).items():
+            if slab := SLAB.fullmatch(quantity):
+                start = {"variant": name, "section": int(slab[1])}
+                row = rows.setdefault((name, int(slab[1])), start)
+                row[slab[2]] = band["mean"]
                 if not slab[2].startswith("x_"):
-                    row |= {f"{slab[2]}_low": band.low, f"{slab[2]}_high": band.high}
-    table = [{"variant": name, "section": n} | row for (name, n), row in rows.items()]
-    return pd.DataFrame(table).sort_values(["variant", "section"], ignore_index=True)
+                    row |= {f"{slab[2]}_{end}": band[end] for end in ("low", "high")}
+    table = pd.DataFrame([*rows.values()])
+    return table.sort_values(["variant", "section"], ignore_index=True)
 
 
 def write_table(comparison: Comparison) -> None:
     """Write table.csv, `run_table` with numbers as they are."""
     import pandas as pd
 
-    with replacing(comparison.path / TABLE) as part:
-        table = pd.DataFrame(_rows(comparison), dtype=object)
-        table.to_csv(part, index=False, lineterminator="\n")
-
-
-def write_summary(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
-    """Write summary.json, with `more` keys."""
-    result = summary_of(comparison, more)
-    write_text(comparison.path / SUMMARY, json.dumps(result, indent=1) + "\n")
-    return result
+    text = pd.DataFrame(_rows(comparison), dtype=object).to_csv(index=False, lineterminator="\n")
+    write_text(comparison.path / TABLE, text)
 
 
 def summary_of(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
     """Means over seeds and variants, and of each variant, with `more` keys, as JSON knows them."""
-    failures = [
-        {"run": one.name, "status": one.status, "reason": one.reason}
-        | {"folder": os.path.relpath(one.folder, comparison.path)}
-        for one in comparison.failed
-    ]
+    kept = ("run", "status", "reason", "folder")
+    lost = [row for row in _rows(comparison) if row["status"] != "done"]
+    failures = [{key: row[key] for key in kept} for row in lost]
     result: dict[str, Any] = {
         "title": comparison.title,
         "runs": len(comparison.entries),
@@ -394,14 +371,19 @@ def summary_of(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any
         band, seeds = comparison.overall(quantity)
         result.setdefault(quantity, _band_row(band) | {"seeds": seeds})
     text = json.dumps(result | dict(more), default=str)
-    plain: dict[str, Any] = json.loads(text, parse_constant=lambda _: None)
-    return plain
+    return dict(json.loads(text, parse_constant=lambda _: None))
 
 
 def _variant_row(comparison: Comparison, name: str) -> dict[str, Any]:
     runs = [entry.status for entry in comparison.entries if entry.variant == name]
     row = {"name": name, "keys": dict(comparison.keys_of(name)), "runs": len(runs)}
     row["failed"] = len(runs) - runs.count("done")
+    return row | _bands_of(comparison, name)
+
+
+def _bands_of(comparison: Comparison, name: str) -> dict[str, Any]:
+    """The band of every quantity of a variant, with its seeds and its extremes."""
+    row = {}
     for quantity in comparison.numbers:
         if values := comparison.values(name, quantity).values():
             ends = {"seeds": len(values), "least": min(values), "most": max(values)}

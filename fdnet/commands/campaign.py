@@ -23,7 +23,7 @@ SOME_FAILED = 5
 _ENGINE = (
     *("--out", "--stages", "--rank-by", "--json", "--quiet"),
     *("--np", "--liggghts", "--launcher", "--timeout"),
-    *("--jobs", "--jobs-limit", "--engine", "--slurm", "--until", "--max-seeds", "--gather"),
+    *("--jobs", "--jobs-limit", "--engine", "--slurm", "--gather"),
 )
 _DRY = (
     "--dry-run",
@@ -104,9 +104,7 @@ def _run_campaign(
         Path(options.out),
         plan,
         how,
-        options.until,
         options.rank_by,
-        most_seeds=options.max_seeds,
         run=not options.gather,
     )
     return _finish(options, comparison, limits)
@@ -124,7 +122,7 @@ def add_campaign_commands(commands: Any) -> None:
     parser.share("case", "--seed", "--set")
     number = "number of seeds, from that of the case on (default 4)"
     parser.add(THE_CASE, "--seeds N", number, int, 4)
-    parser.share(*_ENGINE)
+    parser.share("--fast", *_ENGINE)
     parser.add(OUTPUT, *_DRY)
 
     about = "run and compare the cases and seeds of a file, and rank them by its targets"
@@ -132,7 +130,7 @@ def add_campaign_commands(commands: Any) -> None:
     parser = new_command(commands, "sweep", _run_sweep, about, example)
     file = "the sweep file; with [targets] the variants are ranked by whether they meet them"
     parser.add(THE_CASE, "sweep SWEEP.toml", file, path_option)
-    parser.share(*_ENGINE)
+    parser.share("--fast", *_ENGINE)
     parser.add(OUTPUT, *_DRY)
 
     about = "compare finished runs, with 95 % bands over seeds"
@@ -149,6 +147,8 @@ def add_campaign_commands(commands: Any) -> None:
 def _run_ensemble(options: argparse.Namespace) -> int:
     from fdnet.campaign.plan import ensemble_plan
 
+    if options.fast:
+        options.set.append('invasion.method="network"')
     plan = ensemble_plan(case_of(options), options.seeds, **_plan_options(options))
     return _run_campaign(options, plan)
 
@@ -157,7 +157,7 @@ def _run_sweep(options: argparse.Namespace) -> int:
     from fdnet.campaign.plan import sweep_plan
     from fdnet.campaign.result import read_targets
 
-    plan = sweep_plan(options.sweep, **_plan_options(options))
+    plan = sweep_plan(options.sweep, fast=options.fast, **_plan_options(options))
     return _run_campaign(options, plan, read_targets(plan.targets))
 
 

@@ -123,6 +123,10 @@ _ROWS: tuple[tuple[Any, ...], ...] = (
         *(str, [], {"action": "append"}),
     ),
     (
+        *(THE_CASE, "--fast"),
+        "the fast model: size classes on the pore network instead of spheres in LIGGGHTS",
+    ),
+    (
         *(LIGGGHTS, "--np N"),
         "MPI ranks for invasion and clean-up (default 1); packing takes one, and a cut invasion "
         "is continued with the number it was begun with",
@@ -166,12 +170,6 @@ _ROWS: tuple[tuple[Any, ...], ...] = (
         "slurm_partition=short,runtime=60",
         *(str, None, {"nargs": "?", "const": ""}),
     ),
-    (
-        *(MANY, "--until GOAL"),
-        "add seeds until the 95 % band is as narrow, e.g. 'k_reduction ± 5 %' or "
-        "'k_damaged_m2 +- 10 %'",
-    ),
-    (MANY, "--max-seeds N", "most seeds that --until may spend (default 32)", int, 32),
     (MANY, "--jobs-limit N", "most runs of a plan (default 1000)", int, 1000),
     (MANY, "--gather", "run nothing; gather the runs that are there"),
 )

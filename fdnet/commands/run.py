@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fdnet.commands.options import LIGGGHTS, OUTPUT, THE_CASE, case_of, new_command, stages_of
+from fdnet.commands.options import LIGGGHTS, OUTPUT, case_of, new_command, stages_of
 from fdnet.errors import PAGE, CaseError
 from fdnet.files import path_option
 
@@ -31,8 +31,7 @@ def add_case_commands(commands: Any) -> None:
     run.add(OUTPUT, "--out DIR", "run folder (default runs/NAME)", path_option)
     run.add(OUTPUT, "--resume", "continue an unfinished run")
     run.share("--force", "--stages", "--json", "--quiet")
-    fast = "the fast model: size classes on the pore network instead of spheres in LIGGGHTS"
-    run.add(THE_CASE, "--fast", fast)
+    run.share("--fast")
     dry = "run and write nothing; print velocities, time steps and what is odd (fdnet render CASE "
     dry += "--out DIR writes the LIGGGHTS decks too)"
     run.add(OUTPUT, "--dry-run", dry)

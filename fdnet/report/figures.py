@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 MM, MICRON = 1e3, 1e6
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7F7F7F"
+PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#56B4E9", "#E69F00", "#5A5A5A", "#8C564B")
 """Colours of Okabe and Ito (2008), which colour-blind readers can tell apart."""
 DEPTH_LABEL = "depth from the formation face (mm)"
 MOST_SHAPES = 3000
@@ -42,20 +43,16 @@ STYLE: Any = {
 
 
 def draw(path: Path, fill: Callable[[Any], None]) -> Path:
-    """Save a figure that `fill` draws into, whole or not at all; it has no state of pyplot's.
-
-    The end of the name says whether it is .svg, the same bytes each time, or .png.
-    """
+    """Save a figure that `fill` draws into, whole or not at all: .svg, the same bytes each time,
+    or .png. It has no state of pyplot's."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    kind = "svg" if path.suffix == ".svg" else "png"
-    with rc_context(STYLE):
+    dated: dict[str, Any] = {"metadata": {"Date": None}} if path.suffix == ".svg" else {}
+    with rc_context(STYLE), replacing(path) as part:
         figure = Figure(figsize=(7.2, 4.4), dpi=130, layout="constrained")
         fill(figure)
-        with replacing(path) as part:
-            dated: dict[str, Any] = {"metadata": {"Date": None}} if kind == "svg" else {}
-            figure.savefig(part, format=kind, **dated)
+        figure.savefig(part, **dated)
     return path
 
 
@@ -77,39 +74,29 @@ def stairs(axes: Any, edges: Any, values: Any, **style: Any) -> None:
 
 def legend_above(axes: Any, columns: int = 4) -> None:
     """A legend above the axes, where it can cover no line; none without entries."""
+    place: Any = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2}
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(
-            loc="lower left",
-            bbox_to_anchor=(0.0, 1.0),
-            ncols=columns,
-            frameon=False,
-            borderaxespad=0.2,
-            fontsize=9,
-        )
+        axes.legend(ncols=columns, frameon=False, fontsize=9, **place)
 
 
 def fill_depth(figure: Any, *, analysis: "Analysis") -> None:
     """Two axes: permeability of the sections (mD, in place, with the thin layers) and porosity."""
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.3, 1])
-    edges, layers, profile = _section_edges(analysis), analysis.layers, analysis.profile
+    layers, profile, slabs = analysis.layers, analysis.profile, analysis.sections
+    edges = [*(slab.x_lo for slab in slabs), slabs[-1].x_hi]
     states = [("intact", "initial", GREY), ("damaged", "damaged", BLUE)]
     states = states if analysis.occupancy is not None else states[:1]
     for label, state, colour in states:
-        values = np.array([getattr(s, f"k_{state}_inplace") for s in analysis.sections])
-        style = {"color": colour, "label": f"{label}, sections"}
-        stairs(above, edges, values / MILLIDARCY, **style)
+        k = np.array([getattr(slab, f"k_{state}_inplace") for slab in slabs]) / MILLIDARCY
+        stairs(above, edges, k, color=colour, label=f"{label}, sections")
         porosity = getattr(profile, f"porosity_{state}")
         mean = f"{label}, mean {getattr(analysis, f'porosity_{state}'):.4f}"
         stairs(below, profile.edges, porosity, color=colour, label=mean)
     if layers is not None:
-        for label, k, colour in (
-            ("intact", layers.k_initial, GREY),
-            ("damaged", layers.k_damaged, BLUE),
-        ):
+        for label, state, colour in (("intact", "initial", GREY), ("damaged", "damaged", BLUE)):
             thin = {"color": colour, "label": f"{label}, layers", "linewidth": 1.0, "alpha": 0.8}
-            stairs(above, layers.edges, np.asarray(k) / MILLIDARCY, **thin)
+            stairs(above, layers.edges, getattr(layers, f"k_{state}") / MILLIDARCY, **thin)
         if np.all(np.asarray(layers.k_damaged) > 0):
-            above.set_yscale("log")
             plain_decades(above)
     if above.get_yscale() == "linear":
         above.set_ylim(bottom=0)
@@ -123,9 +110,10 @@ def fill_depth(figure: Any, *, analysis: "Analysis") -> None:
 
 
 def plain_decades(axes: Any) -> None:
-    """Ticks as 1,000 and not 10^3, with those between where there are few decades."""
+    """A logarithmic axis with ticks as 1,000 and not 10^3, more where there are few decades."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
+    axes.set_yscale("log")
     low, high = axes.get_ylim()
     steps = (1, 2, 5) if high < 300 * low else (1,)
     axes.yaxis.set_major_locator(LogLocator(subs=steps))
@@ -143,21 +131,14 @@ ONE_SIZE = 0.02
 """Spread of radii over the largest, below which fines count as of one size."""
 
 
-def has_sizes(spheres: Snapshot) -> bool:
-    """Whether fines of clearly different sizes lie in the specimen."""
-    radius = _inside(spheres).radius
-    return len(radius) > 1 and float(np.ptp(radius)) > ONE_SIZE * float(radius.max())
-
-
-def fill_deposit(figure: Any, *, spheres: Snapshot) -> None:
+def fill_deposit(figure: Any, *, fines: Snapshot) -> None:
     """Volume of the fines inside by depth, stacked in classes of size that hold equal volume."""
-    axes, fines = figure.add_subplot(), _inside(spheres)
+    axes = figure.add_subplot()
     volume, order = 4 / 3 * np.pi * fines.radius**3, np.argsort(fines.radius)
     finer = np.empty(len(fines))
     finer[order] = np.cumsum(volume[order]) / volume.sum()
     number = np.minimum((finer * CLASSES * (1 - 1e-12)).astype(int), CLASSES - 1)
-    low, high = spheres.box[0]
-    edges = np.linspace(low, high, BINS + 1)
+    edges = np.linspace(fines.box[0, 0], fines.box[0, 1], BINS + 1)
     base, width = np.zeros(BINS), float(np.diff(edges)[0])
     for index in np.unique(number):
         own = number == index
@@ -168,18 +149,9 @@ def fill_deposit(figure: Any, *, spheres: Snapshot) -> None:
         style = {"align": "edge", "color": COLOURS[index], "label": label}
         axes.bar(edges[:-1] * MM, height, width * MM, base, **style)
         base += height
-    axes.set(
-        xlabel=DEPTH_LABEL,
-        ylabel=f"share of the deposit by volume\nper {width * MM:.3g} mm (%)",
-        xlim=(low * MM, high * MM),
-    )
+    axes.set_ylabel(f"share of the deposit by volume\nper {width * MM:.3g} mm (%)")
+    axes.set(xlabel=DEPTH_LABEL, xlim=edges[[0, -1]] * MM)
     legend_above(axes, columns=2)
-
-
-def _inside(spheres: Snapshot) -> Snapshot:
-    fines = spheres.fines()
-    low, high = spheres.box[0]
-    return fines.where((fines.position[:, 0] >= low) & (fines.position[:, 0] < high))
 
 
 # ------------------------------------------------------------------------------------------------
@@ -187,7 +159,6 @@ def _inside(spheres: Snapshot) -> Snapshot:
 
 
 def fill_history(figure: Any, *, history: Sequence[Mapping[str, float]]) -> None:
-    """Counts of fines against time, and under them rate and permeability where they are known."""
     counts = (
         ("invaded_count", "inside the specimen", BLUE, "-"),
         ("passed_count", "passed the outlet", GREEN, "--"),
@@ -225,7 +196,6 @@ def fill_network(figure: Any, *, analysis: "Analysis") -> None:
     """Throats of a slice through the middle as lines in the x-z plane, by three quantities.
 
     The pressure is over that of the whole specimen, the flux absolute and over the largest one.
-    Blocked throats are marked in the last axes.
     """
     from matplotlib.collections import LineCollection
     from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
@@ -235,23 +205,22 @@ def fill_network(figure: Any, *, analysis: "Analysis") -> None:
     grains = max(len(np.unique(network.throat_grains)), 1)
     spacing = float(np.cbrt(np.prod(np.ptp(box, axis=1)) / grains))
     away = np.abs(all_ends[:, :, 1].mean(axis=1) - box[1].mean())
-    conducts = np.asarray(analysis.conductance_initial) > 0
-    index = np.flatnonzero((away <= 0.5 * SLICE * spacing) & conducts)
+    clean, left = np.asarray([analysis.conductance_initial, analysis.conductance_damaged])
+    index = np.flatnonzero((away <= 0.5 * SLICE * spacing) & (clean > 0))
     segments = all_ends[index][:, :, ::2] * MM
     pores = np.asarray(network.throat_pores)[index]
     ends = np.where(pores == -1, 1.0, 0.0)  # beyond the faces
     ends[pores >= 0] = np.asarray(analysis.flow_damaged.pore_pressure)[pores[pores >= 0]]
     flux = np.abs(np.asarray(analysis.flow_damaged.throat_flux))[index]
     share = np.clip(flux / (flux.max(initial=0.0) or 1.0), LEAST_FLUX, None)
-    clean = np.asarray(analysis.conductance_initial)[index]
-    left = np.asarray(analysis.conductance_damaged)[index] / clean
+    lost = 100 * (1.0 - left[index] / clean[index])
     losses = ["#D5D5D5", "#E69F00", "#D55E00", "#5A0A00"]
     dark = LinearSegmentedColormap.from_list("losses", losses)
     rows = figure.subplots(3, 1, sharex=True, sharey=True)
     for axes, value, label, scale, colours in (
         (rows[0], ends.mean(axis=1), "pressure (–)", Normalize(0, 1), "viridis"),
         (rows[1], share, "flux / largest (–)", LogNorm(LEAST_FLUX, 1), "magma_r"),
-        (rows[2], 100 * (1.0 - left), "conductance lost (%)", Normalize(0, 100), dark),
+        (rows[2], lost, "conductance lost (%)", Normalize(0, 100), dark),
     ):
         order = np.argsort(np.nan_to_num(value, nan=-1.0))
         lines = LineCollection(list(segments[order]), cmap=colours, norm=scale, linewidths=1.6)
@@ -259,12 +228,9 @@ def fill_network(figure: Any, *, analysis: "Analysis") -> None:
         lines.set_array(np.ma.masked_invalid(value[order]))
         axes.add_collection(lines)
         figure.colorbar(lines, ax=axes, label=label, shrink=0.9, pad=0.01)
-        axes.set(
-            xlim=box[0] * MM + np.array([-0.02, 0.02]) * np.ptp(box[0] * MM),
-            ylim=box[2] * MM + np.array([-0.04, 0.04]) * np.ptp(box[2] * MM),
-            aspect="equal",
-            ylabel="z (mm)",
-        )
+        axes.set_xlim(box[0] * MM + np.array([-0.02, 0.02]) * np.ptp(box[0] * MM))
+        axes.set_ylim(box[2] * MM + np.array([-0.04, 0.04]) * np.ptp(box[2] * MM))
+        axes.set(aspect="equal", ylabel="z (mm)")
         axes.grid(False)
         axes.axvline(box[0, 0] * MM, color=BLUE, linestyle="--", linewidth=1.2)
     middle = segments[blocked_throats(analysis)[index]].mean(axis=1)
@@ -284,22 +250,15 @@ GRAIN_FACE, GRAIN_EDGE = "#D9D9D9", "#8C8C8C"
 
 
 def cut_circles(spheres: Snapshot, plane: float) -> tuple[Array, Array, Array]:
-    """The circles in which the plane y = `plane` m cuts the spheres.
-
-    Returns the index of the sphere (M,), the centre (M, 2) along x and z, m, and the radius (M,),
-    m. A sphere of radius r at distance d < r from the plane is cut in a circle of radius
-    sqrt(r^2 - d^2).
-    """
+    """Index of the spheres (M,) that the plane y = `plane` m cuts, and the circles of the cuts:
+    centre (M, 2) along x and z, m, and radius sqrt(r^2 - d^2) (M,), m, at distance d."""
     squared = spheres.radius**2 - (spheres.position[:, 1] - plane) ** 2
     index = np.flatnonzero(squared > 0)
     return index, spheres.position[index][:, ::2], np.sqrt(squared[index])
 
 
 def fill_side_view(figure: Any, *, snapshot: Snapshot) -> None:
-    """Draw grains (grey) cut at mid-width, and the fines (by radius) that the plane meets whole.
-
-    All is to scale, and the formation face is marked.
-    """
+    """Grains (grey) cut at mid-width, and the fines (by radius) that the plane meets, whole."""
     axes, plane = figure.add_subplot(), float(snapshot.box[1].mean())
     grains, fines = snapshot.grains(), snapshot.fines()
     index, centre, radius = cut_circles(grains, plane)
@@ -352,13 +311,8 @@ def _side_frame(figure: Any, axes: Any, snapshot: Snapshot) -> None:
     axes.axvline(x_lo, color=BLUE, linestyle="--", linewidth=1.6)
     above = axes.get_xaxis_transform()
     axes.text(x_lo, 1.01, "formation face", transform=above, color=BLUE, fontsize=9)
-    axes.set(
-        xlim=(start, x_hi + overhang),
-        ylim=(z_lo - overhang, z_hi + overhang),
-        aspect="equal",
-        xlabel="x, depth from the formation face (mm)",
-        ylabel="z (mm)",
-    )
+    axes.set(xlim=(start, x_hi + overhang), ylim=(z_lo - overhang, z_hi + overhang))
+    axes.set(aspect="equal", xlabel=f"x, {DEPTH_LABEL}", ylabel="z (mm)")
     axes.grid(False)
     width, height = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
     figure.set_size_inches(9.0, min(9.0, max(3.0, 7.2 * height / width + 1.9)))
@@ -368,21 +322,12 @@ def _side_frame(figure: Any, axes: Any, snapshot: Snapshot) -> None:
 # The curves of sizes: asked for, placed, and of the fines that invaded.
 
 
-KIND_COLOURS = {"grains": GREY, "fines": ORANGE}
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlacedSizes:
-    """One kind of spheres of measured sizes.
+    """Grains or fines of measured sizes: the law and the curve of the case, and diameters, m.
 
-    Attributes:
-        name: "grains" or "fines".
-        law: "log-normal", "rosin-rammler", "measured" or "mixture".
-        asked: diameters, m, by the share that is finer, as the case gives them.
-        curve: of the case.
-        placed: (N,) m, diameters of the spheres that were placed.
-        invaded: (M,) m, diameters of the fines that lie in the specimen at the end; None for
-            grains.
+    Those `asked` are by the share that is finer; then come those that were `placed` (N,) and, of
+    fines, those that lie in the specimen at the end (M,).
     """
 
     name: str
@@ -399,15 +344,14 @@ def fill_size_curves(figure: Any, *, sizes: Sequence[PlacedSizes]) -> None:
 
     axes = figure.add_subplot()
     for one in sizes:
-        colour, curve = KIND_COLOURS[one.name], one.curve
+        colour, curve = (GREY if one.name == "grains" else ORANGE), one.curve
         whole = 100 * (curve.below + curve.kept * curve.finer())
         axes.plot(MICRON * curve.edges, whole, color=colour, alpha=0.5, label=f"{one.name}, asked")
         if one.asked:
             shares, diameters = np.array([*one.asked]), np.array([*one.asked.values()])
             axes.plot(MICRON * diameters, 100 * shares, "o", color=colour, label="given points")
-        _size_steps(
-            axes, one.placed, curve, color=colour, label=f"{len(one.placed)} {one.name} placed"
-        )
+        label = f"{len(one.placed)} {one.name} placed"
+        _size_steps(axes, one.placed, curve, color=colour, label=label)
         if one.invaded is not None and len(one.invaded):
             label = f"{len(one.invaded)} of them invaded"
             _size_steps(axes, one.invaded, curve, color=BLUE, linestyle="--", label=label)
@@ -470,10 +414,8 @@ def draw_all(
 ) -> list[Path]:
     """Draw every figure that has data into `folder`; return the paths in the order of the report.
 
-    The folder is made if it is missing. `snapshot` is what the side view shows, the damaged
-    specimen or the grains alone; without one there is no side view. Figures of damage are left out
-    for an intact pack. `history` rows are those of history.csv. `sizes` are those of grains and
-    fines with measured curves. `CAPTIONS` explains each figure under the stem of its file.
+    `snapshot` is what the side view shows, the damaged specimen or the grains alone. `history`
+    rows are those of history.csv. `CAPTIONS` explains each figure under the stem of its file.
     """
     target = Path(folder)
     target.mkdir(parents=True, exist_ok=True)
@@ -481,8 +423,11 @@ def draw_all(
     draws: dict[str, Callable[[Any], None]] = {"depth": partial(fill_depth, analysis=analysis)}
     if snapshot is not None:
         draws["side_view"] = partial(fill_side_view, snapshot=snapshot)
-        if has_sizes(snapshot):
-            draws["deposit_by_size"] = partial(fill_deposit, spheres=snapshot)
+    if snapshot is not None and fines is not None:
+        x, (low, high) = fines.position[:, 0], snapshot.box[0]
+        inside = fines.where((x >= low) & (x < high))
+        if len(inside) and not _one_size(inside.radius):
+            draws["deposit_by_size"] = partial(fill_deposit, fines=inside)
     if analysis.occupancy is not None:
         draws["invaded_fraction"] = partial(_invaded_fraction, analysis=analysis)
     if analysis.layers is not None:
@@ -494,10 +439,6 @@ def draw_all(
     if history:
         draws["invasion_history"] = partial(fill_history, history=history)
     return [draw(target / f"{name}.svg", fill) for name, fill in draws.items()]
-
-
-def _section_edges(analysis: "Analysis") -> Array:
-    return np.array([s.x_lo for s in analysis.sections] + [analysis.sections[-1].x_hi])
 
 
 def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
@@ -520,7 +461,7 @@ def _invaded_fraction(figure: Any, *, analysis: "Analysis") -> None:
 
 def _layers(figure: Any, *, layers: "Layers") -> None:
     above, below = figure.subplots(2, 1, sharex=True)
-    k = [np.asarray(one) / MILLIDARCY for one in (layers.k_initial, layers.k_damaged)]
+    k = layers.k_initial / MILLIDARCY, layers.k_damaged / MILLIDARCY
     for axes, before, after, label in (
         (above, *k, "k of the layer (mD)"),
         (below, 100 * layers.drop_initial, 100 * layers.drop_damaged, "pressure drop (%)"),
@@ -529,7 +470,6 @@ def _layers(figure: Any, *, layers: "Layers") -> None:
         stairs(axes, layers.edges, after, color=BLUE, label="damaged")
         axes.set(ylabel=label, xlim=np.asarray(layers.edges[[0, -1]]) * MM)
     if np.any(layers.k_damaged > 0):
-        above.set_yscale("log")
         plain_decades(above)
     below.set(ylim=(0, None), xlabel=DEPTH_LABEL)
     legend_above(above)
@@ -570,13 +510,9 @@ def _size_distributions(figure: Any, *, analysis: "Analysis", fines: Snapshot | 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageTable:
-    """A table of the page report.html.
+    """A table of the page report.html: heading, columns, rows (SI) and what a reader must know.
 
-    Attributes:
-        title: heading of its part of the page.
-        columns: key, heading, unit, and factor to that unit (None: as it is).
-        rows: with these keys, SI.
-        note: what the reader must know.
+    A column has key, heading, unit, and factor to that unit (None: as it is).
     """
 
     title: str
@@ -587,16 +523,8 @@ class PageTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Added:
-    """One added result.
-
-    Attributes:
-        name: stem of its CSV file and of its figure.
-        rows: of the CSV file, SI; without any there is no file.
-        summary: its keys in summary.json.
-        fill: draws its figure; None without one.
-        caption: of the figure.
-        page: its table in the page; None without one.
-    """
+    """One added result: the stem of its files, its rows (SI, of a CSV file where there are any),
+    its keys in summary.json, what draws its figure, and its table in the page."""
 
     name: str
     rows: Sequence[Mapping[str, Any]] = ()
@@ -629,8 +557,7 @@ def fill_clean_up(
         ("return_k_over_k0", whole[1], BLUE, "-", "after the clean-up"),
     ):
         label = name if share is None else f"{name}, whole {share:.3f}"
-        style = {"color": colour, "linestyle": line, "label": label}
-        stairs(above, edges, [row[key] for row in rows], **style)
+        stairs(above, edges, [row[key] for row in rows], color=colour, linestyle=line, label=label)
     above.axhline(1.0, color=GREY, linewidth=0.8)
     above.set(ylabel="k / intact k (–)", ylim=(0, None))
     bins = np.linspace(MM * edges[0], MM * edges[-1], 41)
@@ -650,44 +577,35 @@ def fill_cake(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
     above.set(ylabel="porosity (–)", ylim=(0, 1))
     k = np.array([row["k_m2"] for row in rows], float) / MILLIDARCY
     stairs(below, edges, k, color=BLUE)
-    below.set(ylabel="permeability (mD)", yscale="log")
     plain_decades(below)
-    below.set(xlabel="distance from the face (mm)", xlim=(0, MM * edges[-1]))
+    below.set(
+        ylabel="permeability (mD)", xlabel="distance from the face (mm)", xlim=(0, MM * edges[-1])
+    )
 
 
 def fill_filtrate(figure: Any, *, time: Array, volume: Array) -> None:
     """Filtrate per area, m, against the root of time, s."""
     axes = figure.add_subplot()
     axes.plot(np.sqrt(time), MM * volume, color=BLUE)
-    axes.set(
-        xlabel="root of the time of the fluid (s$^{1/2}$)",
-        ylabel="filtrate per area (mm)",
-        xlim=(0, None),
-        ylim=(0, None),
-    )
+    axes.set(xlabel="root of the time of the fluid (s$^{1/2}$)", ylabel="filtrate per area (mm)")
+    axes.set(xlim=(0, None), ylim=(0, None))
 
 
 def fill_bridging(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
     """Share of closed throats by the ratio of diameters, with its band."""
-    axes = figure.add_subplot()
-    place = np.arange(len(rows))
-    share = np.array([row["share_closed"] for row in rows])
-    low, high = (np.array([row[key] for row in rows]) for key in ("share_low", "share_high"))
+    axes, place = figure.add_subplot(), np.arange(len(rows))
+    keys = ("share_closed", "share_low", "share_high")
+    share, low, high = (np.array([row[key] for row in rows]) for key in keys)
     axes.bar(place, share, color=BLUE, alpha=0.7)
     axes.errorbar(place, share, [share - low, high - share], fmt="none", color="black", capsize=3)
-    names = [
-        f"{row['ratio_lo']:g} to {row['ratio_hi']:g}"
-        if row["ratio_hi"]
-        else f"> {row['ratio_lo']:g}"
-        for row in rows
-    ]
-    labels = [f"{name}\n({row['throats']})" for name, row in zip(names, rows, strict=True)]
+    labels = []
+    for row in rows:
+        low, high = row["ratio_lo"], row["ratio_hi"]
+        labels.append(f"{low:g} to {high:g}" if high else f"> {low:g}")
+        labels[-1] += f"\n({row['throats']})"
     axes.set_xticks(place, labels, fontsize=9)
-    axes.set(
-        xlabel="diameter of the fines over that of the throat (number of throats)",
-        ylabel="share of the throats that is closed (–)",
-        ylim=(0, 1),
-    )
+    axes.set_xlabel("diameter of the fines over that of the throat (number of throats)")
+    axes.set(ylabel="share of the throats that is closed (–)", ylim=(0, 1))
 
 
 # ------------------------------------------------------------------------------------------------

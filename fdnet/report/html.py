@@ -12,14 +12,7 @@ from typing import Annotated, Any, NamedTuple
 
 from fdnet.errors import CaseError
 from fdnet.files import write_text
-from fdnet.report.tables import (
-    AGREES,
-    SHOWS,
-    JsonObject,
-    in_millidarcy,
-    percent,
-    read_json,
-)
+from fdnet.report.tables import AGREES, SHOWS, JsonObject, in_millidarcy, percent, read_json
 from fdnet.report.text import facts
 
 
@@ -93,10 +86,7 @@ class Mechanics(JsonObject):
 
 
 def mechanics_html(folder: Path) -> str:
-    """The section as HTML from the files in the folder `mechanics`; "" where nothing ran.
-
-    Raises CaseError where the numbers cannot be understood.
-    """
+    """The section as HTML from the files in the folder `mechanics`; "" where nothing ran."""
     path = folder / "mechanics.json"
     if not path.exists():
         return ""
@@ -142,10 +132,7 @@ class _ScaledUp(JsonObject):
 
 
 def formation_html(folder: Path) -> str:
-    """The section as HTML from the files in the folder `formation`; "" where nothing was asked.
-
-    Raises CaseError where a file cannot be understood.
-    """
+    """The section as HTML from the files in the folder `formation`; "" where nothing was asked."""
     found, notes, advice = [], list[str](), "call fdnet core or fdnet well again"
     for name, noun in (("well", "A well"), ("core", "A core")):
         if (path := folder / f"{name}.json").is_file():
@@ -202,16 +189,9 @@ SECTION_COLUMNS = (  # key, heading, unit, factor to that unit
 class ReportParts:
     """What the page shows next to the summary; everything may be left empty.
 
-    Attributes:
-        figures: path and caption of each figure.
-        case_words: the case in sentences.
-        case_text: the resolved case as TOML.
-        scales: rows with name, symbol, value, unit, formula and source (objects or mappings).
-        versions: version of each program.
-        commands: the command lines as they were typed.
-        tables: further tables (`fdnet.report.figures.PageTable`), in order.
-        stokes: the section on resolved Stokes flow, as HTML.
-        mechanics: the section on the mechanics of the pack, as HTML.
+    Figures with their captions, the case in sentences and as TOML, rows of the scales, the
+    version of each program, the command lines as they were typed, further tables
+    (`fdnet.report.figures.PageTable`), and sections as HTML.
     """
 
     figures: Sequence[tuple[Path, str]] = ()
@@ -226,12 +206,10 @@ class ReportParts:
 
 
 def write_report(path: str | Path, summary: Mapping[str, Any], *, parts: ReportParts) -> Path:
-    """Write the page, whole or not at all.
+    """Write the page, whole or not at all. Raises CaseError for a figure that cannot be read.
 
-    `summary` is the mapping of summary.json; keys that it lacks show as a dash, and
-    without `supplied_count` there are no headline numbers.
-
-    Raises CaseError for a figure that cannot be read.
+    `summary` is the mapping of summary.json; keys that it lacks show as a dash, and without
+    `supplied_count` there are no headline numbers.
     """
     figures = [shown_figure(Path(file), caption) for file, caption in parts.figures]
     text = page_text(
@@ -251,13 +229,8 @@ def page_text(template: str, **shown: Any) -> str:
     """A page from its template, a path within fdnet; the style is that of page.html.j2."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    page = Environment(
-        loader=PackageLoader("fdnet", ""),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    how: Any = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    page = Environment(loader=PackageLoader("fdnet", ""), undefined=StrictUndefined, **how)
     for one in (quantity, in_millidarcy, percent, multiplied, words):
         page.filters[one.__name__] = one
     page.filters["fixed"] = lambda value: DASH if value is None else f"{value:.4f}"
@@ -266,8 +239,23 @@ def page_text(template: str, **shown: Any) -> str:
 
 
 def shown_figure(path: Path, caption: str) -> dict[str, str]:
-    """A figure as the macro `show` takes it. Raises CaseError where it cannot be read."""
-    return {"data": _data_uri(path), "caption": caption, "name": path.name}
+    """A figure as the macro `show` takes it; the picture of the specimen is made a JPEG, a
+    quarter of its PNG. Raises CaseError where it cannot be read."""
+    try:
+        kind, data = "svg+xml" if path.suffix == ".svg" else "png", path.read_bytes()
+    except OSError as error:
+        raise CaseError(
+            f"{path}: figure for the report cannot be read ({error.strerror}); draw it again "
+            "with --stages report"
+        ) from error
+    if path.name == STILL:
+        from PIL import Image
+
+        small, kind = io.BytesIO(), "jpeg"
+        Image.open(path).convert("RGB").save(small, "JPEG", quality=85)
+        data = small.getvalue()
+    data_uri = f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"
+    return {"data": data_uri, "caption": caption, "name": path.name}
 
 
 def quantity(value: Any, unit: str = "") -> str:
@@ -302,10 +290,7 @@ _TYPESET = (
     (r" m2\b", " m²"),
     (r"(\d) (?=%|[mµ]?m\b|mD\b|MPa\b|cP\b)", r"\1&nbsp;"),
 )
-"""Pattern and replacement of what the page shows otherwise than a terminal.
-
-What the page of warnings says of a warning stands in the sentence itself, so the link goes.
-"""
+"""Pattern and replacement of what the page shows otherwise than a terminal."""
 
 
 def words(text: str) -> str:
@@ -319,22 +304,3 @@ def words(text: str) -> str:
 def multiplied(value: Any, factor: float | None) -> Any:
     """`value` times `factor`; None stays None."""
     return value if value is None or factor is None else value * factor
-
-
-def _data_uri(path: Path) -> str:
-    """The figure in the page; the picture of the specimen as JPEG, a quarter of its PNG."""
-    kind = {".svg": "svg+xml"}.get(path.suffix, "png")
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise CaseError(
-            f"{path}: figure for the report cannot be read ({error.strerror}); draw it again "
-            "with --stages report"
-        ) from error
-    if path.name == STILL:
-        from PIL import Image
-
-        kind, small = "jpeg", io.BytesIO()
-        Image.open(path).convert("RGB").save(small, "JPEG", quality=85)
-        data = small.getvalue()
-    return f"data:image/{kind};base64,{base64.b64encode(data).decode('ascii')}"

@@ -37,15 +37,9 @@ class MovieFrame(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scene:
-    """What all frames share.
-
-    Attributes:
-        grains: a file of spheres (.vtp) with the grains; states may hold the fines alone.
-        box: (3, 2) m.
-        title: of the colours of the flow; "" where no flow is shown.
-        limits: of these colours.
-        told: whether standard error says how many are drawn.
-    """
+    """What all frames share: a file of spheres (.vtp) with the grains, for states may hold the
+    fines alone; the box (3, 2) m; title and limits of the colours of the flow, "" where no flow
+    is shown; and whether standard error says how many are drawn."""
 
     grains: Path
     box: Array
@@ -59,13 +53,12 @@ def render_spheres_png(
 ) -> str:
     """Draw the 3-D view of `spheres_vtp` into `path`; `box` is (3, 2) m.
 
-    Returns "" or the reason why there is no picture; nothing is raised, and only a complete
-    picture replaces `path`.
+    Returns "" or the reason why there is no picture; only a complete one replaces `path`.
     """
     spheres = Path(spheres_vtp)
+    scene = Scene(grains=spheres, box=box)
     try:
         with replacing(path) as part:
-            scene = Scene(grains=spheres, box=box)
             draw_frames(scene, [MovieFrame(spheres)], [part], seconds=seconds)
     except subprocess.TimeoutExpired:
         return Doubt("no-picture", f"the 3-D picture was given up after {seconds:g} s")
@@ -86,14 +79,8 @@ def draw_frames(
         [str(path.absolute()) if path else "" for path in (one.spheres, one.lines, target)]
         for one, target in zip(frames, targets, strict=True)
     ]
-    work = {
-        "grains": str(scene.grains.absolute()),
-        "box": np.asarray(scene.box).tolist(),
-        "title": scene.title,
-        "limits": scene.limits,
-        "frames": rows,
-        "told": scene.told,
-    }
+    work = {name: getattr(scene, name) for name in ("title", "limits", "told")} | {"frames": rows}
+    work |= {"grains": str(scene.grains.absolute()), "box": np.asarray(scene.box).tolist()}
     package = str(Path(__file__).resolve().parents[2])
     before = os.environ.get("PYTHONPATH")
     done = subprocess.run(
@@ -144,20 +131,14 @@ INK = (20, 20, 20)
 def write_movie(
     target: Path, frames: Sequence[MovieFrame], scene: Scene, *, per_second: float
 ) -> Path:
-    """Draw the states and write them as one file.
+    """Draw the states, at least one, and write them in order as one file: a movie, .gif or .mp4,
+    or a picture of all states below each other, .png.
 
-    Args:
-        target: the movie, .gif or .mp4, or a picture of all states below each other, .png.
-        frames: at least one, in order.
-        scene: what all frames share.
-        per_second: frames a second.
-
-    Raises:
-        CaseError: another suffix, nothing could be drawn, or MP4 without imageio-ffmpeg.
+    Raises CaseError for another suffix, where nothing could be drawn, or for MP4 without
+    imageio-ffmpeg.
     """
     refuse_suffix(target)
     write = {".gif": _write_gif, ".mp4": _write_mp4, ".png": _write_panels}[target.suffix.lower()]
-    still = write is _write_panels
     seconds = 60 + SECONDS_PER_FRAME * len(frames)
     with tempfile.TemporaryDirectory() as folder:
         files = [Path(folder, f"{number:04d}.png") for number in range(len(frames))]
@@ -170,8 +151,9 @@ def write_movie(
                 f"{target}: not drawn, because {reason}; install software OpenGL "
                 "(docs/start/install.md), or open invasion.pvd in ParaView"
             ) from error
+        above = write is _write_panels
         pairs = zip(files, frames, strict=True)
-        pictures = [_worded(file, frame.words, above=still) for file, frame in pairs]
+        pictures = [_worded(file, frame.words, above=above) for file, frame in pairs]
         with replacing(target) as part:
             write(part, pictures, per_second)
     return target
@@ -182,10 +164,8 @@ def refuse_suffix(target: Path) -> None:
     if target.suffix.lower() not in (".gif", ".mp4", ".png"):
         raise CaseError(f"{target}: ends in {target.suffix!r}, expected .gif, .mp4 or .png")
     if target.suffix.lower() == ".mp4" and find_spec("imageio_ffmpeg") is None:
-        raise CaseError(
-            f"{target}: MP4 needs the package imageio-ffmpeg; install it with pip install "
-            "'fdnet[movie]', or give a name that ends in .gif"
-        )
+        advice = "install it with pip install 'fdnet[movie]', or give a name that ends in .gif"
+        raise CaseError(f"{target}: MP4 needs the package imageio-ffmpeg; {advice}")
 
 
 def _worded(path: Path, words: str, *, above: bool) -> Any:
@@ -217,19 +197,16 @@ def _write_panels(path: Path, pictures: Sequence[Any], _: float) -> None:
 
 def _write_gif(path: Path, pictures: Sequence[Any], per_second: float) -> None:
     colours = pictures[-1].quantize(GIF_COLOURS)
-    small = [picture.quantize(palette=colours, dither=0) for picture in _lingering(pictures)]
-    milliseconds = round(1000 / per_second)
-    small[0].save(
-        path, "GIF", save_all=True, append_images=small[1:], duration=milliseconds, loop=0
-    )
+    first, *more = (one.quantize(palette=colours, dither=0) for one in _lingering(pictures))
+    every: Any = {"save_all": True, "append_images": more, "loop": 0}
+    first.save(path, "GIF", duration=round(1000 / per_second), **every)
 
 
 def _write_mp4(path: Path, pictures: Sequence[Any], per_second: float) -> None:
     import imageio_ffmpeg
 
-    stream = imageio_ffmpeg.write_frames(
-        str(path), pictures[0].size, fps=per_second, output_params=["-f", "mp4"]
-    )
+    how: Any = {"fps": per_second, "output_params": ["-f", "mp4"]}
+    stream = imageio_ffmpeg.write_frames(str(path), pictures[0].size, **how)
     stream.send(None)
     for picture in _lingering(pictures):
         stream.send(picture.tobytes())
@@ -266,17 +243,11 @@ FLOW_COLOURS += ["#081D58"]
 """From the lower to the upper limit (YlGnBu of ColorBrewer)."""
 
 
-class View(NamedTuple):
-    """Where a picture is seen from, as seen from the middle of the box, and its pixels."""
+OBLIQUE, BROADSIDE = ((-1.1, -1.9, 0.9), (1500, 950)), ((-0.55, -1.9, 0.75), (1500, 760))
+"""Where the fines, and the flow, are seen from, as seen from the middle of the box, and pixels.
 
-    toward: tuple[float, float, float]
-    window: tuple[int, int]
-
-
-OBLIQUE = View((-1.1, -1.9, 0.9), (1500, 950))
-"""From the front, a little from upstream and above."""
-BROADSIDE = View((-0.55, -1.9, 0.75), (1500, 760))
-"""The mud upstream should not hide the flow in the specimen."""
+From the front, a little from upstream and above; the mud should not hide the flow.
+"""
 
 
 def draw_pictures(work: dict[str, Any]) -> None:
@@ -284,11 +255,11 @@ def draw_pictures(work: dict[str, Any]) -> None:
     import pyvista as pv
 
     bounds, still, flow = np.array(work["box"]) * MM, pv.read(work["grains"]), bool(work["title"])
-    view = BROADSIDE if flow else OBLIQUE
+    toward, window = BROADSIDE if flow else OBLIQUE
     colours = {} if flow else colours_of(pv.read(work["frames"][-1][0]), bounds)
     for number, (spheres, lines, target) in enumerate(work["frames"], 1):
         state = pv.read(spheres)
-        plotter: Any = pv.Plotter(off_screen=True, window_size=list(view.window))
+        plotter: Any = pv.Plotter(off_screen=True, window_size=list(window))
         plotter.set_background("white")
         if flow:
             grains = still.point_data["kind"] == Kind.GRAIN
@@ -300,15 +271,14 @@ def draw_pictures(work: dict[str, Any]) -> None:
         else:
             own = state.n_points and np.any(state.point_data["kind"] == Kind.GRAIN)
             packed = state if own else still
-            far = (packed.point_data["kind"] == Kind.GRAIN) & (
-                packed.points[:, 1] * MM > bounds[1].mean()
-            )
+            far = packed.points[:, 1] * MM > bounds[1].mean()
+            far &= packed.point_data["kind"] == Kind.GRAIN
             if far.any():
                 grey = {"color": GRAIN_COLOUR, "smooth_shading": True, "ambient": 0.15}
                 plotter.add_mesh(_balls(packed, far, 32), **grey)
             _add_fines(plotter, state, bounds, **colours)
         _add_frame(plotter, bounds, depth_only=flow)
-        _look(plotter, bounds, view)
+        _look(plotter, bounds, toward)
         plotter.screenshot(target)
         plotter.close()
         if work["told"]:
@@ -352,19 +322,9 @@ def colours_of(spheres: Any, bounds: Array) -> dict[str, Any]:
 
 
 def _bar(title: str, *, labels: int) -> dict[str, Any]:
-    return {
-        "title": f"{title}\n",
-        "color": "black",
-        "title_font_size": 22,
-        "label_font_size": 22,
-        "fmt": "%.3g",
-        "n_labels": labels,
-        "vertical": True,
-        "position_x": 0.88,
-        "position_y": 0.15,
-        "width": 0.07,
-        "height": 0.65,
-    }
+    letters = {"color": "black", "title_font_size": 22, "label_font_size": 22, "fmt": "%.3g"}
+    place = {"vertical": True, "position_x": 0.88, "position_y": 0.15, "width": 0.07}
+    return {"title": f"{title}\n", "n_labels": labels, "height": 0.65, **letters, **place}
 
 
 def _add_fines(plotter: Any, spheres: Any, bounds: Array, **style: Any) -> None:
@@ -381,16 +341,9 @@ def _add_lines(
     mesh.points = mesh.points * MM
     if not mesh.n_points:
         return
-    plotter.add_mesh(
-        _pipes(mesh, radius, limits[1]),
-        scalars="value",
-        log_scale=True,
-        clim=limits,
-        cmap=FLOW_COLOURS,
-        ambient=0.35,
-        smooth_shading=True,
-        scalar_bar_args=_bar(title, labels=3),
-    )
+    scale = {"scalars": "value", "log_scale": True, "clim": limits, "cmap": FLOW_COLOURS}
+    look = {"ambient": 0.35, "smooth_shading": True, "scalar_bar_args": _bar(title, labels=3)}
+    plotter.add_mesh(_pipes(mesh, radius, limits[1]), **scale, **look)
 
 
 def _pipes(mesh: Any, radius: float, most: float) -> Any:
@@ -411,53 +364,31 @@ def _add_frame(plotter: Any, bounds: Array, *, depth_only: bool) -> None:
     """The box with its scales (mm), or that of the depth alone, and the formation face."""
     import pyvista as pv
 
-    (x0, x1), (y0, y1), (z0, z1) = bounds
-    box = pv.Box((x0, x1, y0, y1, z0, z1))
-    plotter.add_mesh(box, style="wireframe", color="black", line_width=2)
-    face = pv.Plane(
-        center=(x0, (y0 + y1) / 2, (z0 + z1) / 2),
-        direction=(1, 0, 0),
-        i_size=z1 - z0,
-        j_size=y1 - y0,
-        i_resolution=1,
-        j_resolution=1,
-    )
+    (x0, _), (y0, y1), (z0, z1) = bounds
+    sides = tuple(bounds.ravel())
+    plotter.add_mesh(pv.Box(sides), style="wireframe", color="black", line_width=2)
+    size: Any = {"i_size": z1 - z0, "j_size": y1 - y0, "i_resolution": 1, "j_resolution": 1}
+    face = pv.Plane(center=(x0, (y0 + y1) / 2, (z0 + z1) / 2), direction=(1, 0, 0), **size)
     edge = {"show_edges": True, "edge_color": FACE_COLOUR, "line_width": 3}
     plotter.add_mesh(face, color=FACE_COLOUR, opacity=0.18, **edge)
-    plotter.add_point_labels(
-        [(x0, y1, z1 + 0.12 * (z1 - z0))],
-        ["formation face x = 0"],
-        font_size=22,
-        text_color=FACE_COLOUR,
-        shape=None,
-        show_points=False,
-        always_visible=True,
-    )
-    plotter.show_bounds(
-        bounds=(x0, x1, y0, y1, z0, z1),
-        xtitle="x (mm)",
-        ytitle=" " if depth_only else f"y: {y0:.3g} to {y1:.3g} mm",
-        show_ylabels=False,
-        show_zlabels=not depth_only,
-        ztitle=" " if depth_only else "z (mm)",
-        color="black",
-        font_size=18,
-        location="outer",
-        grid=False,
-        fmt="%.3g",
-        n_xlabels=5,
-        n_ylabels=3,
-        n_zlabels=3,
-    )
+    place, text = [(x0, y1, z1 + 0.12 * (z1 - z0))], ["formation face x = 0"]
+    alone = {"shape": None, "show_points": False, "always_visible": True}
+    plotter.add_point_labels(place, text, font_size=22, text_color=FACE_COLOUR, **alone)
+    titles = {"xtitle": "x (mm)", "ytitle": " ", "ztitle": " "}
+    if not depth_only:
+        titles |= {"ytitle": f"y: {y0:.3g} to {y1:.3g} mm", "ztitle": "z (mm)"}
+    labels = {"show_ylabels": False, "show_zlabels": not depth_only, "fmt": "%.3g"}
+    labels |= {"n_xlabels": 5, "n_ylabels": 3, "n_zlabels": 3, "font_size": 18, "color": "black"}
+    plotter.show_bounds(bounds=sides, location="outer", grid=False, **titles, **labels)
 
 
-def _look(plotter: Any, bounds: Array, view: View) -> None:
+def _look(plotter: Any, bounds: Array, toward: tuple[float, float, float]) -> None:
     """Look at the box so that it fills the window left of the scalar bar."""
-    eye = np.array(view.toward) / np.linalg.norm(view.toward)
+    eye = np.array(toward) / np.linalg.norm(toward)
     right = np.cross([0.0, 0.0, 1.0], eye)
     right /= np.linalg.norm(right)
     up = np.cross(eye, right)
-    wide, high = view.window
+    wide, high = plotter.window_size
     corners = np.stack(np.meshgrid(*bounds), axis=-1).reshape(-1, 3) - bounds.mean(axis=1)
     width, height = np.ptp(corners @ right), np.ptp(corners @ up)
     scale = max(0.62 * height, 0.7 * width * high / wide)  # half the height of the window, mm

@@ -29,16 +29,11 @@ MILLIDARCY = M2_PER_MD
 """One millidarcy in m2: a darcy is 1 cP cm/s under 1 atm/cm (API RP 27, 1952)."""
 
 
-def millidarcy(permeability: float) -> float:
-    """Permeability in m2 as mD."""
-    return permeability / MILLIDARCY
-
-
 def in_millidarcy(permeability: Any) -> str:
     """Permeability in m2 as mD with four digits and without a unit; a dash for None or NaN."""
     if permeability is None or permeability != permeability:
         return "–"
-    value = float(f"{millidarcy(permeability):.4g}")
+    value = float(f"{permeability / MILLIDARCY:.4g}")
     return f"{value:,.10g}" if value == 0 or abs(value) >= 1e-3 else f"{value:.3e}"
 
 
@@ -71,9 +66,6 @@ AGREES = {True: "agrees", False: "disagrees", None: "not decided"}
 # CSV tables and summary.json of a run folder: SI, units in the column names, nine digits.
 
 
-FLOAT_FORMAT = "%.9g"
-
-
 def section_rows(analysis: "Analysis") -> list[dict[str, Any]]:
     """The sections as `sections.csv` and `summary.json` name their values."""
     return [section.row() for section in analysis.sections]
@@ -91,30 +83,21 @@ def write_rows(path: str | Path, rows: Any) -> Path:
         if edge in frame:
             frame[edge] = [repr(float(x)) for x in frame[edge]]
     with replacing(path) as part:
-        frame.to_csv(part, index=False, float_format=FLOAT_FORMAT, lineterminator="\n")
+        frame.to_csv(part, index=False, float_format="%.9g", lineterminator="\n")
     return Path(path)
 
 
 def write_sections(path: str | Path, analysis: "Analysis") -> Path:
-    """One row for each section; k_reduction is empty where k is 0.
-
-    The permeabilities of the slab cut out stand in mD as well.
-    """
-    both = ("initial", "damaged")
-    return write_rows(
-        path,
-        [
-            row | {f"k_{name}_mD": millidarcy(row[f"k_{name}_m2"]) for name in both}
-            for row in section_rows(analysis)
-        ],
-    )
+    """One row for each section, of slabs cut out also in mD; k_reduction is empty where k is 0."""
+    rows = section_rows(analysis)
+    for row in rows:
+        for name in ("k_initial", "k_damaged"):
+            row[f"{name}_mD"] = row[f"{name}_m2"] / MILLIDARCY
+    return write_rows(path, rows)
 
 
 def write_profile(path: str | Path, analysis: "Analysis") -> Path:
-    """One row for each bin of depth.
-
-    porosity_reduction is the difference initial - damaged (Shi 2011, Figure 16).
-    """
+    """One row for each bin of depth; porosity_reduction is of Shi 2011, Figure 16."""
     profile = analysis.profile
     before, after = profile.porosity_initial, profile.porosity_damaged
     columns = {
@@ -135,10 +118,7 @@ LAYER_COLUMNS = (
 
 
 def write_layers(path: str | Path, layers: "Layers") -> Path:
-    """One row for each layer, in place, from the network of all spheres.
-
-    The pressure drops are over that of the specimen; empty where nothing flows.
-    """
+    """One row for each layer, in place; drops are over that of the specimen, or empty."""
     edges, k = layers.edges, (layers.k_initial, layers.k_damaged)
     columns = (edges[:-1], edges[1:], *k, layers.drop_initial, layers.drop_damaged)
     return write_rows(path, dict(zip(LAYER_COLUMNS, (*columns, layers.fines_count), strict=True)))
@@ -209,8 +189,7 @@ def write_throats(path: str | Path, analysis: "Analysis") -> Path:
 def plain_json(mapping: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
     """`mapping` as plain values and as JSON text.
 
-    JSON has no NaN or infinity: each becomes null and a line in `warnings` names it. Raises
-    TypeError for values that are no numbers, texts, lists or mappings.
+    JSON has no NaN or infinity: each becomes null and a line in `warnings` names it.
     """
     refused: list[str] = []
     plain = _plain(mapping, "", refused)
@@ -259,10 +238,8 @@ def _split(name: str, values: Array, unit: str = "") -> dict[str, Array]:
 def _plain(value: Any, where: str, refused: list[str]) -> Any:
     """`value` as JSON knows it; NaN and infinities become None and are named in `refused`."""
     if isinstance(value, Mapping):
-        return {
-            str(key): _plain(item, f"{where}.{key}".lstrip("."), refused)
-            for key, item in value.items()
-        }
+        start = f"{where}." if where else ""
+        return {str(key): _plain(one, f"{start}{key}", refused) for key, one in value.items()}
     if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim):
         return [_plain(item, f"{where}[{i}]", refused) for i, item in enumerate(value)]
     if isinstance(value, np.generic | np.ndarray):
@@ -270,12 +247,8 @@ def _plain(value: Any, where: str, refused: list[str]) -> Any:
     if isinstance(value, Enum | Path):
         return value.name.lower() if isinstance(value, Enum) else str(value)
     if isinstance(value, float) and not math.isfinite(value):
-        refused.append(
-            Doubt(
-                "not-a-number",
-                f"summary {where}: {value} is not a number JSON can hold; written as null",
-            )
-        )
+        words = f"summary {where}: {value} is not a number JSON can hold; written as null"
+        refused.append(Doubt("not-a-number", words))
         return None
     return value
 
@@ -349,9 +322,7 @@ def read_json(path: Path, model: type[JsonObject], *, noun: str, advice: str) ->
     the model says; the message names the key. `noun` is what the file should be, and `advice`
     what to do where it is not.
     """
-    if not path.is_file():
-        what = "is no ordinary file" if path.exists() else "is missing"
-        raise CaseError(f"{path}: {what}; {advice}")
+    _refuse_missing(path, advice)
     try:
         data = from_json(path.read_bytes(), allow_inf_nan=False)
         model.model_validate(data)
@@ -364,6 +335,12 @@ def read_json(path: Path, model: type[JsonObject], *, noun: str, advice: str) ->
     except ValueError as error:
         raise CaseError(f"{path}: cannot be read as JSON ({error}); {advice}") from error
     return data
+
+
+def _refuse_missing(path: Path, advice: str) -> None:
+    if not path.is_file():
+        what = "is no ordinary file" if path.exists() else "is missing"
+        raise CaseError(f"{path}: {what}; {advice}")
 
 
 def _problem(error: ValidationError) -> str:
@@ -383,25 +360,17 @@ def read_table(path: Path, columns: Sequence[str] = ()) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    if not path.is_file():
-        problem = "is no ordinary file" if path.exists() else "is missing"
-        raise CaseError(f"{path}: {problem}; {_again(path)}")
+    _refuse_missing(path, _again(path))
+    # every digit is read; from pandas 3 on that is the default
+    exact: Any = {"float_precision": "round_trip"} if pd.__version__.startswith("2.") else {}
     try:
-        table = pd.read_csv(path, **_exact_numbers())
+        table = pd.read_csv(path, **exact)
     except (OSError, ValueError) as error:
         why = f"cannot be read as a table ({str(error).strip()})"
         raise CaseError(f"{path}: {why}; {_again(path)}") from error
-    missing = [name for name in columns if name not in table.columns]
-    if missing:
+    if missing := [name for name in columns if name not in table.columns]:
         raise CaseError(f"{path}: has no column {', '.join(missing)}; {_again(path)}")
     return table
-
-
-def _exact_numbers() -> dict[str, Any]:
-    """The option with which pandas reads every digit; from pandas 3 on that is the default."""
-    import pandas as pd
-
-    return {"float_precision": "round_trip"} if int(pd.__version__.split(".")[0]) < 3 else {}
 
 
 def empty_table(columns: Sequence[str]) -> "pd.DataFrame":
@@ -430,8 +399,7 @@ def to_openpnm(network: Network, conductance: Array, *, viscosity: float) -> Any
 
     fdnet holds the pressure on the two faces of the box. A throat that a face cuts therefore ends
     in a pore of its own on that face, with the conductance of the part inside. Pores of one
-    `pore_group` have one pressure and are one pore. Pores and throats that no flow reaches are
-    left out.
+    `pore_group` have one pressure and are one pore. What no flow reaches is left out.
 
     Args:
         network: the pore network; its box is not periodic along x.
@@ -455,9 +423,8 @@ def to_openpnm(network: Network, conductance: Array, *, viscosity: float) -> Any
             'OpenPNM is not installed; install it with pip install "fdnet[openpnm]", or use '
             "pores.csv and throats.csv of the run"
         ) from error
-    made = openpnm.network.Network(
-        coords=arrays.pop("pore.coords"), conns=arrays.pop("throat.conns")
-    )
+    places, pairs = arrays.pop("pore.coords"), arrays.pop("throat.conns")
+    made = openpnm.network.Network(coords=places, conns=pairs)
     for name, values in arrays.items():
         made[name] = values
     return made
@@ -466,10 +433,9 @@ def to_openpnm(network: Network, conductance: Array, *, viscosity: float) -> Any
 def openpnm_arrays(network: Network, conductance: Array, *, viscosity: float) -> dict[str, Array]:
     """The arrays of `to_openpnm` by their OpenPNM names."""
     if network.periodic[0]:
-        raise CaseError(
-            "OpenPNM: the network is periodic along x, where fdnet prescribes a pressure drop per "
-            "period; build it with walls along x (periodic='yz')"
-        )
+        what = "where fdnet prescribes a pressure drop per period"
+        advice = "build it with walls along x (periodic='yz')"
+        raise CaseError(f"OpenPNM: the network is periodic along x, {what}; {advice}")
     if not viscosity > 0:
         raise CaseError(f"viscosity: {viscosity} Pa s, expected a number above 0")
     links = open_links(network, conductance)

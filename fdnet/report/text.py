@@ -52,7 +52,7 @@ def case_words(case: Case, scales: object = None) -> Iterator[str]:
         yield "No mud."
     sides = " x ".join(f"{MM * side:.3g}" for side in case.size_m)
     held = {"walls": "between walls", "periodic": "periodic across the flow"}[case.box.sides]
-    yield (f"Specimen: {sides} mm, {held}; the flow goes along the first side. Seed {case.seed}.")
+    yield f"Specimen: {sides} mm, {held}; the flow goes along the first side. Seed {case.seed}."
 
 
 def _size_words(spheres: Spheres) -> str:
@@ -110,10 +110,8 @@ def end_words(summary: Mapping[str, Any], control: Run) -> str:
     """Why the invasion ended, as a part of a sentence; the case's `control` has the rules."""
     reason, rate = summary["stop_reason"], summary.get("rate_over_initial")
     if reason == "unfinished":
-        return (
-            f"the invasion was cut at {percent(summary['share_done'])} % of the steps that it is "
-            "expected to take"
-        )
+        done = percent(summary["share_done"])
+        return f"the invasion was cut at {done} % of the steps that it is expected to take"
     if reason != "plugged":
         return ENDS[reason]
     if control.stop_rate is not None and rate is not None and rate <= control.stop_rate:
@@ -162,8 +160,8 @@ def cake_words(summary: Mapping[str, Any]) -> str:
 def answer_sentence(summary: Mapping[str, Any]) -> str:
     """One sentence to act on; `summary` has the keys of the answer where there are fines."""
     if "damage" not in summary:
-        k, porosity = summary["k_initial_m2"], 100 * summary["porosity_initial"]
-        return f"The intact sand has {in_millidarcy(k)} mD at a porosity of {porosity:.1f} %."
+        k, porosity = in_millidarcy(summary["k_initial_m2"]), 100 * summary["porosity_initial"]
+        return f"The intact sand has {k} mD at a porosity of {porosity:.1f} %."
     if not summary["invaded_count"]:
         return "No fine entered the sand, so it keeps its permeability."
     depth = _depth_words(summary, summary["damage"])
@@ -175,11 +173,10 @@ TWICE = 2.0
 
 
 def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
-    depth = millimetres(summary["invasion_depth_p95_m"])
-    p95, limit = (
-        f"95 % of the fines that entered lie within {depth}",
-        two_digits(damage["lost_from"]),
+    p95 = (
+        f"95 % of the fines that entered lie within {millimetres(summary['invasion_depth_p95_m'])}"
     )
+    limit = two_digits(damage["lost_from"])
     if summary["final"] is False:
         if summary["stop_reason"] == "unfinished":
             return (
@@ -273,11 +270,6 @@ class Fact(NamedTuple):
         """Number and remark in one line."""
         return f"{self.value} {self.remark}".rstrip(" :,")
 
-    @property
-    def short(self) -> str:
-        """The number alone."""
-        return self.value.rstrip(":,")
-
 
 def followed(summary: Mapping[str, Any]) -> float | None:
     """k over k0 at the last update of a flow that followed the deposit; None without one."""
@@ -289,38 +281,25 @@ def _law_of(summary: Mapping[str, Any]) -> str:
 
 
 def facts(summary: Mapping[str, Any]) -> Iterator[Fact]:
-    """The headline numbers of a run.
-
-    Where the flow followed the deposit there are two laws of its damage, and each number names
-    its own.
-    """
+    """The headline numbers of a run; where the flow followed, each names the law of its damage."""
     before, after = summary["k_initial_m2"], summary["k_damaged_m2"]
     damaged, flow = summary["supplied_count"] or summary["invaded_count"], followed(summary)
+    k, si = in_millidarcy(before), f"({before:.3g}"
     if damaged:
-        yield Fact(
-            "permeability",
-            f"{in_millidarcy(before)} -> {in_millidarcy(after)} mD",
-            f"({before:.3g} -> {after:.3g} m2), {percent(summary['k_reduction'])} % lost"
-            + ("" if flow is None else f" by the law {_law_of(summary)}"),
-        )
-    else:
-        yield Fact("permeability", f"{in_millidarcy(before)} mD", f"({before:.3g} m2)")
+        lost = f"{percent(summary['k_reduction'])} % lost"
+        lost += "" if flow is None else f" by the law {_law_of(summary)}"
+        k, si = f"{k} -> {in_millidarcy(after)}", f"{si} -> {after:.3g} m2), {lost}"
+    yield Fact("permeability", f"{k} mD", si if damaged else f"{si} m2)")
     other = summary.get("k_damaged_other_m2")
     if other is not None:
-        law = summary["damage_law_other"]
-        yield Fact(
-            "other law", f"{in_millidarcy(other)} mD", f"({other:.3g} m2) with fines by {law}"
-        )
+        law = f"({other:.3g} m2) with fines by {summary['damage_law_other']}"
+        yield Fact("other law", f"{in_millidarcy(other)} mD", law)
     if flow is not None:
-        yield Fact(
-            "k of the flow",
-            f"{percent(1 - flow)} % lost",
-            f"as the simulated flow met it last: {FLOW_LAW} (k_over_k0 of history.csv)",
-        )
+        law = f"as the simulated flow met it last: {FLOW_LAW} (k_over_k0 of history.csv)"
+        yield Fact("k of the flow", f"{percent(1 - flow)} % lost", law)
     porosity = f"{summary['porosity_initial']:.4f}"
-    yield Fact(
-        "porosity", f"{porosity} -> {summary['porosity_damaged']:.4f}" if damaged else porosity
-    )
+    porosity += f" -> {summary['porosity_damaged']:.4f}" if damaged else ""
+    yield Fact("porosity", porosity)
     if damaged:
         yield from _facts_of_fines(summary)
     else:
@@ -331,43 +310,27 @@ def facts(summary: Mapping[str, Any]) -> Iterator[Fact]:
 
 def _facts_of_fines(summary: Mapping[str, Any]) -> Iterator[Fact]:
     words, damage = summary.get("words", {}), summary.get("damage")
-    yield Fact(
-        "fines",
-        f"{summary['invaded_count']} invaded,",
-        f"{summary['passed_count']} passed, {summary['upstream_count']} upstream of "
-        f"{summary['supplied_count']} supplied",
-    )
+    passed, upstream, of = (summary[f"{n}_count"] for n in ("passed", "upstream", "supplied"))
+    said = f"{passed} passed, {upstream} upstream of {of} supplied"
+    yield Fact("fines", f"{summary['invaded_count']} invaded,", said)
     end, colon, why = (words.get("end") or str(summary["stop_reason"])).partition(": ")
     yield Fact("end", f"{end}{colon.strip()}", why)
-    yield Fact(
-        "depth",
-        f"95 % above {millimetres(summary['invasion_depth_p95_m'])},",
-        f"deepest {millimetres(summary['invasion_depth_m'])}",
-    )
+    p95, deepest = (millimetres(summary[f"invasion_depth{end}_m"]) for end in ("_p95", ""))
+    yield Fact("depth", f"95 % above {p95},", f"deepest {deepest}")
     if damage and damage["zone_depth_m"]:
-        kept = percent(damage["zone_k_over_k0"])
-        yield Fact(
-            "damaged zone",
-            f"{millimetres(damage['zone_depth_m'])},",
-            f"which keeps {kept} % of its permeability",
-        )
+        kept = f"which keeps {percent(damage['zone_k_over_k0'])} % of its permeability"
+        yield Fact("damaged zone", f"{millimetres(damage['zone_depth_m'])},", kept)
     if "skin" in summary:
-        yield Fact(
-            "skin",
-            "infinite," if summary["skin"] is None else f"{summary['skin']:.2g},",
-            f"costs {two_digits(summary['skin_flow_lost'])} of the flow of a well of "
-            f"{millimetres(summary['skin_well_radius_m'])} radius",
-        )
+        skin = "infinite" if summary["skin"] is None else f"{summary['skin']:.2g}"
+        lost, well = two_digits(summary["skin_flow_lost"]), summary["skin_well_radius_m"]
+        said = f"costs {lost} of the flow of a well of {millimetres(well)} radius"
+        yield Fact("skin", f"{skin},", said)
     yield Fact("cake", f"{millimetres(summary['cake_thickness_m'])}:", words.get("cake", ""))
-
-
-def _said(summary: Mapping[str, Any]) -> Iterator[str]:
-    yield from filter(None, (summary.get("answer"), *summary.get("certainty", ())))
 
 
 def summary_lines(summary: Mapping[str, Any]) -> Iterator[str]:
     """The answer, headline numbers, the table of sections, rules of thumb, warnings."""
-    for text in _said(summary):
+    for text in filter(None, (summary.get("answer"), *summary.get("certainty", ()))):
         yield from textwrap.wrap(text, WIDTH)
     yield ""
     for one in facts(summary):
@@ -381,10 +344,8 @@ def summary_lines(summary: Mapping[str, Any]) -> Iterator[str]:
         yield f"rules of thumb (the run {SHOWS[summary['run_shows']]}):"
         for rule in summary["rules"]:
             author, agrees = rule["source"].split(",")[0], AGREES[rule["agrees"]]
-            yield (
-                f"  {author:<22} {rule['value']:>6.3g}  {rule['says']:<8} {agrees:<12} "
-                f"({rule['limit']})"
-            )
+            said = f"  {author:<22} {rule['value']:>6.3g}  {rule['says']:<8} {agrees:<12}"
+            yield f"{said} ({rule['limit']})"
         yield ""
     warnings = summary["warnings"]
     for warning in warnings[:SHOWN]:
@@ -408,19 +369,15 @@ def text_lines(path: Path, summary: Mapping[str, Any]) -> Iterator[str]:
     yield seconds_line(summary)
 
 
-def section_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+def section_cells(row: Mapping[str, Any]) -> Iterator[str]:
     """A section as the cells of `_HEAD`."""
     before, after = row["k_initial_inplace_m2"], row["k_damaged_inplace_m2"]
-    return (
-        f"{1e3 * row['x_lo_m']:.2f}-{1e3 * row['x_hi_m']:.2f}",
-        f"{row['porosity_initial']:.4f}",
-        f"{row['porosity_damaged']:.4f}",
-        in_millidarcy(row["k_initial_m2"]),
-        in_millidarcy(row["k_damaged_m2"]),
-        percent(row["k_reduction"]),
-        percent(1 - after / before if before else None),
-        str(row["fines_count"]),
-    )
+    yield f"{1e3 * row['x_lo_m']:.2f}-{1e3 * row['x_hi_m']:.2f}"
+    yield from (f"{row[f'porosity_{state}']:.4f}" for state in ("initial", "damaged"))
+    yield from (in_millidarcy(row[f"k_{state}_m2"]) for state in ("initial", "damaged"))
+    yield percent(row["k_reduction"])
+    yield percent(1 - after / before if before else None)
+    yield str(row["fines_count"])
 
 
 # ------------------------------------------------------------------------------------------------
@@ -429,12 +386,12 @@ def section_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
 
 def thesis_law_warning(chosen: "Analysis", default: "Analysis") -> str:
     """What laws that are off by factors give, with what fdnet's default laws give of the same."""
+    own = " and ".join(filter(None, (default.law, default.damage_law_used)))
     return Doubt(
         "laws-of-the-thesis",
         f"the laws {chosen.law} and {chosen.damage_law} are kept to compare with the thesis, and "
         f"those of the thesis are wrong by factors: they give {_states(chosen)}, where fdnet's "
-        f"default laws ({' and '.join(filter(None, (default.law, default.damage_law_used)))}) "
-        f"give {_states(default)}",
+        f"default laws ({own}) give {_states(default)}",
     )
 
 
@@ -449,12 +406,10 @@ def _states(analysis: "Analysis") -> str:
 def permeability_lines(
     results: Sequence[Mapping[str, Any]], *, sections: bool, fines: bool
 ) -> Iterator[str]:
-    """The laws as a table, then the sections where there are any, and warnings.
+    """The laws as a table, then with `sections` those of the box, and warnings.
 
-    Args:
-        results: one row for each pair of laws, the chosen pair first.
-        sections: whether sections are printed.
-        fines: whether there are fines; without them nothing is damaged.
+    `results` is one row for each pair of laws, the chosen pair first; without `fines` nothing is
+    damaged.
     """
     first = results[0]
     porosity = f"porosity {first['porosity_initial']:.5f}"
@@ -478,10 +433,9 @@ def permeability_lines(
         yield f"{first['damage_law']}: the damage law {first['damage_law_used']} was taken"
     if first.get("k_damaged_other_m2") is not None:
         other = first["k_damaged_other_m2"]
-        yield (
-            f"with fines by {first['damage_law_other']}: {other:.5g} m2, {other / MILLIDARCY:.5g} "
-            "mD; the difference is a measure of the error"
-        )
+        both = f"{other:.5g} m2, {other / MILLIDARCY:.5g} mD"
+        law = first["damage_law_other"]
+        yield f"with fines by {law}: {both}; the difference is a measure of the error"
     if sections:
         used = first.get("damage_law_used") or first["damage_law"]
         laws = f"{first['law']} and {used}" if fines else first["law"]
@@ -489,12 +443,12 @@ def permeability_lines(
         damaged = f"{'damaged':>9} " if fines else ""
         yield f"{'from m':>10} {'to m':>10} {'porosity':>9} {damaged}{names}"
         for row in first["sections"]:
-            damaged = f"{row['porosity_damaged']:>9.5f} " if fines else ""
-            yield (
-                f"{row['x_lo_m']:>10.4g} {row['x_hi_m']:>10.4g} {row['porosity_initial']:>9.5f} "
-                + damaged
-                + _values(row["k_initial_m2"], row["k_damaged_m2"], fines=fines)
+            place = (
+                f"{row['x_lo_m']:>10.4g} {row['x_hi_m']:>10.4g} {row['porosity_initial']:>9.5f}"
             )
+            damaged = f" {row['porosity_damaged']:>9.5f}" if fines else ""
+            k = _values(row["k_initial_m2"], row["k_damaged_m2"], fines=fines)
+            yield f"{place}{damaged} {k}"
     yield from (f"assumed: {fact}" for fact in first.get("assumptions", ()))
     yield from (f"warning: {warning}" for warning in first["warnings"])
 

@@ -43,16 +43,13 @@ def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:
     """The pore network: pores as points, throats as lines.
 
     Points 0 .. P-1 are the pores. Further points (`end` 1) are where a throat leaves the network
-    at a face or goes to a periodic image, so that no line crosses the whole box. Cell data:
-    geometry and porosity of the throats, conductances (times viscosity, m3), fluxes (times
-    viscosity over the pressure drop, m3), share of the conductance lost, blocked, law_used as in
-    `LAW_CODES`. Point data: pressure over the pressure drop, radius (m), volume (m3).
+    at a face or goes to a periodic image, so that no line crosses the whole box. Conductances are
+    times viscosity (m3), fluxes times viscosity over the pressure drop (m3), pressures over the
+    pressure drop; law_used is as in `LAW_CODES`.
     """
     network, occupancy = analysis.network, analysis.occupancy
     mesh, source, periods = _network_mesh(network)
-    clean, damaged = (
-        np.asarray(one) for one in (analysis.conductance_initial, analysis.conductance_damaged)
-    )
+    clean, damaged = np.asarray([analysis.conductance_initial, analysis.conductance_damaged])
     none = np.zeros(len(clean))
     codes = [LAW_CODES.get(str(name), -1) for name in analysis.law_used]
     cells = {
@@ -69,8 +66,7 @@ def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:
         "flux_damaged_m3": analysis.flow_damaged.throat_flux,
         "conductance_lost": 1.0 - np.divide(damaged, clean, out=none + 1.0, where=clean > 0),
     }
-    for name, values in cells.items():
-        mesh.cell_data[name] = values
+    mesh.cell_data.update(cells)
 
     def with_ends(values: Array, inlet: float, outlet: float) -> Array:
         """Values of the pores, then of the ends: those of their pores, or of the faces."""
@@ -90,8 +86,7 @@ def write_network_vtp(path: str | Path, analysis: "Analysis") -> Path:
         "share": np.append(network.pore_share, nothing),
         "end": np.repeat(np.array([0, 1], np.uint8), [len(network.pore_radius), len(source)]),
     }
-    for name, values in points.items():
-        mesh.point_data[name] = values
+    mesh.point_data.update(points)
     return _save(path, mesh)
 
 
@@ -129,21 +124,15 @@ def write_spheres_vtp(path: str | Path, snapshot: Snapshot) -> Path:
 
 
 def write_pvd(path: str | Path, entries: Sequence[tuple[float, str | Path]]) -> Path:
-    """A ParaView collection of (time in s, file).
-
-    The files are named relative to the folder of `path`.
-    """
+    """A ParaView collection of (time in s, file); files are named relative to its folder."""
     folder = Path(path).resolve().parent
     rows = "".join(
         f'    <DataSet timestep={quoteattr(repr(float(time)))} part="0" '
         f"file={quoteattr(Path(os.path.relpath(Path(folder, file), folder)).as_posix())}/>\n"
         for time, file in entries
     )
-    return write_text(
-        path,
-        '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
-        f"{rows}  </Collection>\n</VTKFile>\n",
-    )
+    head = '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+    return write_text(path, f"{head}{rows}  </Collection>\n</VTKFile>\n")
 
 
 def write_macro(path: str | Path) -> Path:

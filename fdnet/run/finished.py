@@ -20,8 +20,8 @@ from fdnet.network.states import all_conductances
 from fdnet.report.figures import fill_depth, shown
 from fdnet.report.tables import (
     LAYER_COLUMNS,
+    MILLIDARCY,
     empty_table,
-    millidarcy,
     read_summary,
     read_table,
     to_openpnm,
@@ -67,7 +67,7 @@ class FinishedRun:
         in_m2 = f"{name.removesuffix('_mD')}_m2"
         if name.startswith("k_") and name.endswith("_mD") and in_m2 in self.summary:
             k = self.summary[in_m2]
-            return None if k is None else millidarcy(k)
+            return None if k is None else k / MILLIDARCY
         near = get_close_matches(name, dir(self), 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise AttributeError(f"a run of fdnet has no {name!r}{hint}")

@@ -64,15 +64,21 @@ def draw_answer(shortcuts: Sequence[Shortcut], path: Path) -> None:
 def _save(path: Path, heights: Sequence[float], fill: Callable[[Sequence["Axes"]], None]) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
-    from PIL import Image
 
     with rc_context({"font.size": 8, "axes.titlesize": 8}):
         figure = Figure(figsize=(WIDTH, sum(heights)), layout="constrained")
         fill(list(figure.subplots(len(heights), squeeze=False, height_ratios=heights)[:, 0]))
         drawn = io.BytesIO()
         figure.savefig(drawn, dpi=DPI, format="png")
+    with_few_colours(drawn, path)
+
+
+def with_few_colours(drawn: Any, path: Path) -> None:
+    """Keep 64 colours of a drawn picture, which is then a third as large."""
+    from PIL import Image
+
     few = Image.open(drawn).convert("RGB").quantize(64, dither=Image.Dither.NONE)
-    with replacing(path) as part:  # with few colours, and a third as large
+    with replacing(path) as part:
         few.save(part, format="png", optimize=True)
 
 

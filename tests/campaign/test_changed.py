@@ -9,9 +9,7 @@ import pytest
 from builders import tiny
 from campaign.samples import finished_run
 
-import fdnet
 from fdnet.cli import main
-from fdnet.errors import CaseError
 from fdnet.run.folder import digests_of
 
 BAD = "tiny-seed-2"
@@ -156,48 +154,3 @@ def test_a_plan_of_another_shape_is_refused_in_one_line(ensemble, tmp_path, caps
         lines = capsys.readouterr().err.splitlines()
         assert len(lines) == 2
         assert all(line.startswith(f"fdnet: {out / 'plan.json'}: ") for line in lines)
-
-
-def test_seeds_are_added_until_the_band_is_narrow(ensemble, tmp_path):
-    """Half bands of the first 3 and 6 values are 0.248 and t(5) sqrt(0.00416 / 6) = 0.0677.
-
-    Three seeds ask for 7 of a band of 0.1, and at most twice as many are taken at a time; percent
-    of a share are points. The runs are there already, so nothing is run.
-    """
-    for goal, most, seeds in (
-        ("k_reduction ± 25 %", 20, 3),
-        ("k_reduction +- 0.1", 20, 6),
-        ("k_reduction ± 10 %", 20, 6),
-        ("k_reduction ± 0.001 %", 8, 8),
-        ("k_damaged_m2 ± 10%", 20, 3),
-    ):
-        out = tmp_path / goal
-        shutil.copytree(ensemble, out)
-        made = fdnet.ensemble(tiny(), out=out, seeds=3, until=goal, max_seeds=most, engine="local")
-        row = made.summary["k_reduction"]
-        assert row["seeds"] == seeds, goal
-    shutil.copytree(ensemble, tmp_path / "six")
-    row = fdnet.ensemble(tiny(), out=tmp_path / "six", seeds=6).summary["k_reduction"]
-    assert row["high"] - row["mean"] == pytest.approx(2.570582 * (0.00416 / 6) ** 0.5)
-
-
-def test_seeds_are_added_by_the_whole_band(tmp_path):
-    """Of 0.02, 0.1 and 0.18 half a band is 0.199; what is left of it at 0 is half as wide."""
-    assert gather(tmp_path / "out") == 5
-    for seed, value in enumerate([0.02, 0.10, 0.18, 0.1, 0.1, 0.1], start=1):
-        finished_run(
-            tmp_path / f"out/runs/tiny-seed-{seed}", tiny(f"seed={seed}"), k_reduction=value
-        )
-    for goal, seeds in (("k_reduction ± 20 %", 3), ("k_reduction ± 19 %", 4)):
-        made = fdnet.ensemble(tiny(), out=tmp_path / "out", seeds=3, until=goal)
-        assert made.summary["done"] == seeds
-
-
-def test_a_goal_that_says_nothing_is_refused(ensemble, tmp_path):
-    for goal in ("k_reduction", "± 5 %", "k_reduction ± 0 %", "k ± x", ""):
-        with pytest.raises(CaseError, match="--until"):
-            fdnet.ensemble(tiny(), out=tmp_path / "none", until=goal)
-    shutil.copytree(ensemble, tmp_path / "out")
-    with pytest.raises(CaseError, match="did you mean k_reduction"):
-        fdnet.ensemble(tiny(), out=tmp_path / "out", seeds=3, until="k_reduce ± 5 %")
-    assert not (tmp_path / "none").exists()

@@ -167,3 +167,29 @@ def test_a_pack_of_another_seed_is_not_taken(swept, tmp_path, capsys):
     assert main([*arguments, "--out", str(tmp_path / "r"), "--pack-from", str(source)]) == 2
     assert "another case or seed" in capsys.readouterr().err
     assert not (tmp_path / "r").exists()
+
+
+def test_the_fast_model_runs_without_liggghts_and_the_page_says_so(swept, tmp_path, capsys):
+    """Its seeds are those of `fdnet run --fast`, on the packs of LIGGGHTS."""
+    case, out = swept[0].parent / "tiny.toml", tmp_path / "out"
+    assert main(["ensemble", str(case), "--fast", "--seeds", "2", "--out", str(out), *STAGES]) == 0
+    said = "All runs are by the fast model of size classes: on the packs of five cases"
+    assert said in capsys.readouterr().out
+    assert said in (out / "compare.html").read_text()
+    alone = tmp_path / "alone"
+    stages = ["--stages", "pack,invade,analyse", "--quiet"]
+    assert main(["run", str(case), "--fast", "--seed", "2", "--out", str(alone), *stages]) == 0
+    k = json.loads((alone / "summary.json").read_text())["k_damaged_m2"]
+    assert [float(row["k_damaged_m2"]) for row in rows(out / "table.csv")][1] == k
+    assert {row["method"] for row in rows(out / "table.csv")} == {"network"}
+    assert not list(out.rglob("in.invade"))
+    again = fdnet.ensemble(fdnet.read_case(case), fast=True, seeds=2, out=out, engine="local")
+    assert again.summary["k_damaged_m2"]["mean"] > 0
+    assert "fast model" not in str(fdnet.open_runs(swept[0]))
+
+
+def test_a_sweep_by_the_fast_model_varies_no_model(swept, tmp_path):
+    file = swept[0].parent / "fast.toml"
+    file.write_text('case = "tiny.toml"\n[grid]\ninvasion.method = ["network", "liggghts"]\n')
+    with pytest.raises(fdnet.CaseError, match=r"varies invasion\.method; leave --fast out"):
+        fdnet.sweep(file, out=tmp_path / "out", fast=True)

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from builders import naming
 
-from fdnet.report.tables import in_millidarcy, millidarcy, percent
+from fdnet.report.tables import MILLIDARCY, in_millidarcy, percent
 from fdnet.report.text import answer_sentence, facts, in_place_words
 from fdnet.run.answer import (
     FOLLOWED,
@@ -70,7 +70,7 @@ def test_rings_in_series_are_the_integral_of_the_pressure():
 
 
 def test_millidarcy_is_that_of_the_recommended_practice():
-    assert millidarcy(9.869233e-13) == pytest.approx(1000.0, rel=1e-12)
+    assert pytest.approx(9.869233e-13, rel=1e-12) == 1000.0 * MILLIDARCY
     assert in_millidarcy(9.869233e-13) == "1,000"
     assert in_millidarcy(9.869233e-16 * 194553.0) == "194,600"
     assert in_millidarcy(9.869233e-16 * 0.25) == "0.25"

@@ -6,6 +6,7 @@
 
 import argparse
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -16,13 +17,7 @@ from fdnet.errors import CaseError, LiggghtsError
 from fdnet.files import path_option, refuse_folder_name, write_text
 from validation.thesis.compare import tables, trends
 from validation.thesis.figures import Sources, draw_all
-from validation.thesis.quantities import (
-    Run,
-    deposition,
-    examine,
-    result_rows,
-    statistics,
-)
+from validation.thesis.quantities import Run, deposition, examine, result_rows, statistics
 from validation.thesis.runs import Planned, find_state, make_runs, planned
 
 STATES = Path(__file__).parent / "states"
@@ -35,30 +30,20 @@ def main(arguments: list[str]) -> int:
     Raises LiggghtsError when runs failed, after the tables of all others are written, and
     CaseError when there is nothing to draw.
     """
-    parser = argparse.ArgumentParser(
-        prog="validation.py thesis",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = argparse.ArgumentParser(prog="validation.py thesis", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="one run of each quick form, minutes")
     parser.add_argument("--redraw", action="store_true", help="run nothing, draw the kept states")
     parser.add_argument("--jobs", type=int, default=1, help="runs side by side (default 1)")
     parser.add_argument("--out", type=path_option, help="tables and figures (docs/thesis)")
-    parser.add_argument(
-        "--runs", type=path_option, default=Path("runs/thesis"), help="run folders"
-    )
-    parser.add_argument("--silent", action="store_true", help="no progress")
     options = parser.parse_args(arguments)
     out = options.out or Path("studies/thesis-quick" if options.quick else "docs/thesis")
-    for folder in (options.runs, out):
-        refuse_folder_name(folder)
-    if options.jobs < 1:
-        raise CaseError(f"--jobs: {options.jobs} runs side by side, expected at least 1")
-    states = out / "states" if options.out or options.quick else STATES
+    refuse_folder_name(out)
+    states, runs = STATES, Path("runs/thesis")
+    if options.out or options.quick:
+        states, runs = out / "states", out / "runs"
     plan, failed = planned(quick=options.quick), []
     if not options.redraw:
-        show = not options.silent
-        failed = make_runs(plan, states, options.runs, jobs=options.jobs, show=show)
+        failed = make_runs(plan, states, runs, jobs=options.jobs)
     compared = write_all(plan, out, states)
     print(compared.groupby(["trend", "scale", "laws", "verdict"]).size().to_string())
     print(f"tables and figures: {out}")
@@ -73,46 +58,41 @@ def write_all(plan: Sequence[Planned], out: Path, states: Path) -> pd.DataFrame:
     Rows of an earlier results.csv stay where a run has no state, or none by those laws today. Runs
     of specimens and variants are drawn, or the quick forms when there is nothing else.
     """
-    kept: Any = pd.read_csv(out / "results.csv") if (out / "results.csv").exists() else None
-    results: list[dict[str, Any]] = []
-    runs: list[Run] = []
+    shown = {"quick"} if {one.group for one in plan} == {"quick"} else {"specimen", "variant"}
+    kept, results, drawn = _rows_in(out / "results.csv"), list[Any](), dict[str, list[Run]]()
     for item in plan:
-        state, rows = find_state(states, item), []
-        if state is not None:
-            runs.append(examine(item, state))
-            rows = result_rows(runs[-1])
-            if item.group not in ("specimen", "variant") and len(plan) > len(planned(quick=True)):
-                runs.pop()
-        known = {(one["law"], one["damage_law"]) for one in rows}
-        if kept is not None:
-            mine: Any = kept[(kept.id == item.id) & (kept.seed == item.seed)].to_dict("records")
-            rows += [one for one in mine if (one["law"], one["damage_law"]) not in known]
-        results += rows
+        rows = dict[Any, Any]()
+        if state := find_state(states, item):
+            run = examine(item, state)
+            rows = {(one["law"], one["damage_law"]): one for one in result_rows(run)}
+            if item.group in shown:
+                drawn.setdefault(item.name.removeprefix(QUICK), []).append(run)
+        for one in kept:
+            if (one["id"], one["seed"]) == (item.id, item.seed):
+                rows.setdefault((one["law"], one["damage_law"]), one)
+        results += rows.values()
     if not results:
-        raise CaseError(
-            f"{out}: the folder holds no state and no results of this study; leave out --redraw "
-            "to run it"
-        )
-    table = _write(out / "results.csv", results)
+        what = "the folder holds no state and no results of this study"
+        raise CaseError(f"{out}: {what}; leave out --redraw to run it")
+    out.mkdir(parents=True, exist_ok=True)
+    table, runs = _write(out / "results.csv", results), [*chain(*drawn.values())]
     measured = [row for run in runs for row in statistics(run)]
-    path = out / "statistics.csv"
-    if path.exists():  # what earlier scripts measured in another way stays
-        readings = {row["note"].split(";")[0] for row in measured}
-        earlier: Any = pd.read_csv(path, keep_default_na=False).to_dict("records")
-        measured += [row for row in earlier if row["note"].split(";")[0] not in readings]
-    _write(path, measured)
+    readings = {row["note"].split(";")[0] for row in measured}
+    earlier = _rows_in(out / "statistics.csv", keep_default_na=False)  # by other readings
+    measured += [row for row in earlier if row["note"].split(";")[0] not in readings]
+    _write(out / "statistics.csv", measured)
     _write(out / "deposition.csv", [row for run in runs for row in deposition(run)])
     compared = _write(out / "trends.csv", trends(table))
     _write(out / "tables.csv", list(tables(table)))
-    by_name: dict[str, list[Run]] = {}
-    for run in runs:
-        by_name.setdefault(run.item.name.removeprefix(QUICK), []).append(run)
-    _write(out / "figures.csv", draw_all(Sources(by_name, table), out))
+    _write(out / "figures.csv", draw_all(Sources(drawn, table), out))
     return compared
+
+
+def _rows_in(path: Path, **how: Any) -> list[Any]:
+    return pd.read_csv(path, **how).to_dict("records") if path.exists() else []
 
 
 def _write(path: Path, rows: Any) -> pd.DataFrame:
     table = pd.DataFrame(rows)
-    path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, table.to_csv(index=False, float_format="%.9g"))
     return table

@@ -7,6 +7,7 @@ its quick form, which is cautious: that has a sixth of the cross-section.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,26 +17,15 @@ from scipy.stats import t as student
 
 from fdnet.case.file import QUICK
 from fdnet.spheres.snapshot import Array
-from validation.thesis.published import (
-    SPECIMENS,
-    TABLE3,
-    in_words,
-    reductions,
-    rows_in,
-    thesis_of,
-)
+from validation.thesis.published import in_words, reductions, rows_in, thesis_of
 from validation.thesis.quantities import SECTIONS
 
-Table = Any
-"""Rows of results.csv as a pandas table, or a column of it."""
+Table = Any  # rows of results.csv as a pandas table, or a column of it
 LAWS = ("thesis, thesis", "lubrication, auto", "lubrication, all-spheres")
 """The thesis's laws, an earlier default of fdnet (rows of earlier scripts), and that of today."""
-HOLDS, FAILS, UNDECIDED = "holds", "does not hold", "not decided"
 MARGIN, OVERLAP, PASSED, ROUNDING = 0.20, 0.05, 0.05, 1e-9
 """Losses of porosity are alike within a fifth of the larger. Overlap over a diameter and share of
 fines passed through above which a remark is made. Differences that count as none."""
-
-
 QUANTITIES: Mapping[str, Any] = {row.quantity: row for row in rows_in("quantities.csv")}
 """The quantities of a run by name, from quantities.csv.
 
@@ -48,13 +38,10 @@ spread is widened, and may be too small when fines pass through (`deep`).
 def values_in(rows: Table, quantity: str) -> Table:
     """(R,) a quantity from R rows of results.csv."""
     if QUANTITIES[quantity].by_law:
-        deep, others = ([f"k_reduction_{i}" for i in range(2, last + 1)] for last in (4, SECTIONS))
-        total = rows.k_reduction_1 + rows[deep].sum(axis=1)
-        rows = rows.assign(
-            k_1_to_4_mm=rows[deep].mean(axis=1),
-            k_beyond_1_mm=rows[others].max(axis=1),
-            k_sum_to_4_mm=total.where(total > 0),
-        )
+        deep, others = rows[_sections("k_reduction", 2, 4)], rows[_sections("k_reduction", 2)]
+        total = rows.k_reduction_1 + deep.sum(axis=1)
+        more = {"k_1_to_4_mm": deep.mean(axis=1), "k_beyond_1_mm": others.max(axis=1)}
+        rows = rows.assign(**more, k_sum_to_4_mm=total.where(total > 0))
     return rows.eval(QUANTITIES[quantity].values).astype(float)
 
 
@@ -64,8 +51,7 @@ def reported(run: str, quantity: str) -> str:
     one = thesis_of(run)
     values = reductions(one)[:1] if name == "section_reduction" else one.get(name, [])
     sense = one.get("senses", {}).get(name.replace("section", "first_section"), "")
-    values = values if isinstance(values, list) else [values]
-    return " or ".join(in_words(sense, value, scale) for value in values)
+    return " or ".join(in_words(sense, value, scale) for value in np.atleast_1d(values))
 
 
 def rows_of(results: Table, run: str, laws: str = LAWS[0]) -> Table:
@@ -118,43 +104,22 @@ def half_width(*means: Mean) -> float:
 
 
 # ---- Tables 3 to 11: tables.csv.
-ONE, FIVE = ("specimen1", "specimen1-7to8", "specimen1-1410"), ("specimen5", "specimen5-5to6")
-TABLES: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
-    "Table 3": ((TABLE3,), [*QUANTITIES][:6]),
-    "Table 4": (SPECIMENS[:6], [*QUANTITIES][:6]),
-    "Table 5": (SPECIMENS[6:7], [*QUANTITIES][:6]),
-    "Table 6": (SPECIMENS[7:], [*QUANTITIES][:6]),
-    "Table 7": (ONE, [*QUANTITIES][:13]),
-    "Table 8": (ONE, ["k_reduction", "k_reduction_inplace"]),
-    "Table 9": (FIVE, [*QUANTITIES][:13]),
-    "Table 10": (FIVE, ["k_reduction", "k_reduction_inplace"]),
-    "Table 11": (SPECIMENS[7:], [*QUANTITIES][:13]),
-    "Figures 49, 58, 65, 69, 72": ((TABLE3, *SPECIMENS), [*QUANTITIES][12:14]),
-}
-"""The runs next to each of the thesis's tables, and the quantities, or k by section."""
-
-
 def tables(results: Table) -> Iterator[dict[str, Any]]:
-    """Rows of tables.csv: each number of the thesis's tables next to ours with its band."""
-    for table, (runs, names) in TABLES.items():
-        for run in runs:
-            for laws in (LAWS[0], LAWS[2]):
-                rows = rows_of(results, run, laws)
-                for label, given, values, unit, by_law in _cells(rows, run, names):
-                    if laws == LAWS[0] or by_law:
-                        mean = mean_of(values.dropna().to_numpy(float))
-                        yield {
-                            "table": table,
-                            "run": run,
-                            "quantity": label,
-                            "laws": laws if by_law else "",
-                            "unit": unit,
-                            "thesis": given,
-                            "ours": mean.mean,
-                            "half_width": half_width(mean),
-                            "seeds": mean.seeds,
-                            "ended_by": ", ".join(dict.fromkeys(rows.stop_reason)),
-                        }
+    """Rows of tables.csv: each number of the thesis's tables next to ours with its band.
+
+    compared.csv has the runs next to each table, and the quantities, or k by section.
+    """
+    for table in rows_in("compared.csv"):
+        for run, laws in product(table.runs.split("|"), (LAWS[0], LAWS[2])):
+            rows = rows_of(results, run, laws)
+            for name, given, values, unit, by_law in _cells(rows, run, table.names.split("|")):
+                if laws != LAWS[0] and not by_law:
+                    continue
+                mean = mean_of(values.dropna().to_numpy(float))
+                row = {"table": table.table, "run": run, "quantity": name}
+                row |= {"laws": laws if by_law else "", "unit": unit, "thesis": given}
+                row |= {"ours": mean.mean, "half_width": half_width(mean), "seeds": mean.seeds}
+                yield row | {"ended_by": ", ".join(dict.fromkeys(rows.stop_reason))}
 
 
 def _cells(rows: Table, run: str, names: Sequence[str]) -> Iterator[tuple[Any, ...]]:
@@ -163,10 +128,13 @@ def _cells(rows: Table, run: str, names: Sequence[str]) -> Iterator[tuple[Any, .
         if name in QUANTITIES:
             one = QUANTITIES[name]
             yield name, reported(run, name), values_in(rows, name), one.unit, one.by_law
-            continue
-        for number in range(1, SECTIONS + 1):
-            column = f"{name}_{number}"
-            yield column, given[number - 1], 100 * rows[column], "%", True
+        else:
+            for column, told in zip(_sections(name), given, strict=False):
+                yield column, told, 100 * rows[column], "%", True
+
+
+def _sections(name: str, first: int = 1, last: int = SECTIONS) -> list[str]:
+    return [f"{name}_{number}" for number in range(first, last + 1)]
 
 
 # ---- The seven trends of the thesis's chapter 4 and Figure 14: trends.csv.
@@ -184,10 +152,9 @@ def trends(results: Table) -> list[dict[str, Any]]:
     `one` has "more" than `other`, is "alike" within MARGIN, or lies "above" the bound. The bound
     of trend 1 is the share that the thesis's specimen 1 has in its first millimetre.
     """
-    claims = rows_in("claims.csv")
     made = []
     for scale, prefix in (("full scale", ""), ("quick forms", QUICK)):
-        for claim in claims:
+        for claim in rows_in("claims.csv"):
             name = RESPONSES.get(claim.quantity, (claim.quantity,))[0]
             names = [prefix + one for one in (claim.one, claim.other) if one]
             if claim.quantity in RESPONSES and not responses(results, names[0], claim.quantity):
@@ -213,9 +180,11 @@ def responses(results: Table, run: str, response: str) -> list[float]:
     made = []
     for _, one in table[(rows.id == run) | (scanned[0] == run)].dropna().groupby("seed"):
         x, y = one.x.to_numpy(), one.y.to_numpy()
-        if len(one) >= 3 and response.startswith("rank"):
+        if len(one) < 3:
+            continue
+        if response.startswith("rank"):
             made.append(0.0 if np.ptp(y) == 0 else float(spearmanr(x, y).statistic))
-        elif len(one) >= 3:
+        else:
             made.append(float(np.dot(x - x.mean(), y) / np.dot(x - x.mean(), x)))
     return made
 
@@ -226,44 +195,31 @@ def _compared(results: Table, claim: Any, names: Sequence[str], laws: str) -> di
     gap, half = values[0] - values[1], half_width(*means)
     margin = MARGIN * max(values) if claim.sense == "alike" else math.nan
     name, *unit = RESPONSES.get(claim.quantity, (claim.quantity,))
-    return {
-        "quantity": claim.quantity,
-        "unit": unit[0] if unit else QUANTITIES[name].unit,
-        "sense": claim.sense,
-        "one": names[0],
-        "other": names[1] if claim.other else "",
-        "one_value": values[0],
-        "other_value": values[1],
-        "difference": gap,
-        "low": gap - half,
-        "high": gap + half,
-        "margin": margin,
-        "verdict": verdict(claim.sense, gap - half, gap + half, margin),
-        "runs_one": means[0].seeds,
-        "runs_other": means[1].seeds if claim.other else 0,
-        "spread": "; ".join(dict.fromkeys(one.spread for one in means if one.spread)),
-        "note": "; ".join(_notes(results, names, claim, deep=bool(QUANTITIES[name].deep))),
-    }
+    row = {"quantity": claim.quantity, "unit": unit[0] if unit else QUANTITIES[name].unit}
+    row |= {"sense": claim.sense, "one": names[0], "other": names[1] if claim.other else ""}
+    row |= {"one_value": values[0], "other_value": values[1], "difference": gap}
+    row |= {"low": gap - half, "high": gap + half, "margin": margin}
+    row |= {"verdict": verdict(claim.sense, gap - half, gap + half, margin)}
+    row |= {"runs_one": means[0].seeds, "runs_other": means[1].seeds if claim.other else 0}
+    row["spread"] = "; ".join(dict.fromkeys(one.spread for one in means if one.spread))
+    notes = _notes(results, names, claim, deep=bool(QUANTITIES[name].deep))
+    return row | {"note": "; ".join(notes)}
 
 
 def _mean(results: Table, run: str, quantity: str, laws: str) -> Mean:
-    samples = [
-        responses(results, name, quantity)
-        if quantity in RESPONSES
-        else values_of(results, name, quantity, laws)
-        for name in (run, *([] if run.startswith(QUICK) else [QUICK + run]))
-    ]
-    grows = bool(quantity in QUANTITIES and QUANTITIES[quantity].grows)
-    return mean_of(*samples, grows=grows)
+    names = [run] if run.startswith(QUICK) else [run, QUICK + run]
+    if quantity in RESPONSES:
+        return mean_of(*(responses(results, name, quantity) for name in names))
+    samples = (values_of(results, name, quantity, laws) for name in names)
+    return mean_of(*samples, grows=bool(QUANTITIES[quantity].grows))
 
 
-def verdict(sense: str, low: float, high: float, margin: float = math.nan) -> str:
+def verdict(sense: str, low: float, high: float, margin: float) -> str:
     """What the 95 % interval of a difference decides; "alike" is within `margin`."""
+    holds, fails = low > ROUNDING, high < -ROUNDING
     if sense == "alike":
-        if -margin <= low and high <= margin:
-            return HOLDS
-        return FAILS if low > margin or high < -margin else UNDECIDED
-    return HOLDS if low > ROUNDING else FAILS if high < -ROUNDING else UNDECIDED
+        holds, fails = -margin <= low and high <= margin, low > margin or high < -margin
+    return "holds" if holds else "does not hold" if fails else "not decided"
 
 
 def _notes(results: Table, names: Sequence[str], claim: Any, *, deep: bool) -> Iterator[str]:
@@ -276,13 +232,11 @@ def _notes(results: Table, names: Sequence[str], claim: Any, *, deep: bool) -> I
         if not len(rows):
             yield f"no run of {name}"
             continue
-        ends = sorted({*rows.stop_reason} - {"plugged"})
-        if ends:
+        if ends := sorted({*rows.stop_reason} - {"plugged"}):
             yield f"{name} ended by {', '.join(ends)}"
         if rows.max_overlap.max() > OVERLAP:
-            most = f"{rows.max_overlap.max():.0%}"
-            yield f"fines of {name} overlap by up to {most} of a diameter"
+            yield f"fines of {name} overlap by up to {rows.max_overlap.max():.0%} of a diameter"
         passed, inside = int(rows.passed_count.sum()), int(rows.invaded_count.sum())
         if deep and passed > PASSED * (inside + passed):
-            share = f"{passed / (inside + passed):.0%}"
-            yield f"{share} of the fines passed through {name}, so they went deeper still"
+            share = passed / (inside + passed)
+            yield f"{share:.0%} of the fines passed through {name}, so they went deeper still"

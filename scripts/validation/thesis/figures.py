@@ -1,8 +1,8 @@
 """The figures of the thesis, all drawn from one table of panels, panels.csv.
 
 A panel has the number of the thesis's figure, a kind of plot, quantities and specimens, and its
-axes; each kind is one function. Curves are means over seeds with their range as a band. Diamonds
-and dotted lines in black are the thesis's numbers.
+axes; each kind is one function, which may return lines for the head. Curves are means over seeds
+with their range as a band. Diamonds and dotted lines in black are the thesis's numbers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,30 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from fdnet.report.figures import draw
+from fdnet.report.figures import BLUE, GREEN, GREY, ORANGE, draw
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from validation.picture import with_few_colours
+from validation.thesis import published as known
+from validation.thesis import quantities
 from validation.thesis.compare import QUANTITIES, values_of
-from validation.thesis.published import (
-    published,
-    reductions,
-    rows_in,
-    specimen_of,
-    statistics_of,
-    thesis_of,
-)
-from validation.thesis.quantities import (
-    FIELDS,
-    POROSITY,
-    WHOLE,
-    Run,
-    fines_in_class,
-    first_section,
-    measure,
-    weighted,
-)
+from validation.thesis.published import reductions, specimen_of, thesis_of
+from validation.thesis.quantities import POROSITY, WHOLE, Run, first_section, measure, weighted
 from validation.thesis.runs import points
 
-BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#7F7F7F"
 COLOURS = ("", BLUE, GREEN, ORANGE, "#56B4E9", "#E69F00", "#000000", "#CC79A7", GREY)
 """Of specimens 1 to 8 (Okabe and Ito 2008)."""
 MARK: Any = {"color": "black", "marker": "D", "markerfacecolor": "white", "linestyle": ""}
@@ -55,67 +41,50 @@ class Sources(NamedTuple):
 def draw_all(sources: Sources, folder: Path) -> list[dict[str, str]]:
     """Draw every panel that has its sources; returns the panels with what is `missing` of each."""
     rows = []
-    for panel in rows_in("panels.csv"):
-        rows.append(dict(vars(panel)))
-        panel.names, panel.specimens = panel.names.split("|"), panel.specimens.split("|")
-        missing = [one for one in panel.specimens if not sources.runs.get(one)]
+    for row in known.rows_in("panels.csv"):
+        names, specimens = row.names.split("|"), row.specimens.split("|")
+        panel = row._replace(names=names, specimens=specimens)
+        missing = [one for one in specimens if not sources.runs.get(one)]
         if panel.kind == "scan":
-            ids = [o.id for o in points() if o.group == panel.specimens[0] and o.setting]
+            ids = [o.id for o in points() if o.group == specimens[0] and o.setting]
             missing = [] if sources.results.id.isin(ids).any() else ["runs"]
         if panel.kind == "distance" and not missing and not len(_distances(panel, sources)):
             missing = ["fines in such throats"]
-        rows[-1]["missing"] = "; ".join(missing)
+        rows.append(row._asdict() | {"missing": "; ".join(missing)})
         if not missing:
             path = folder / f"figure_{panel.figure}.png"
-            draw(path, partial(KINDS[panel.kind], panel=panel, sources=sources))
-            _with_few_colours(path)
+            with_few_colours(draw(path, partial(_fill, panel=panel, sources=sources)), path)
     return rows
 
 
-def _with_few_colours(path: Path) -> None:
-    """Keep 64 colours of a picture, which is then a third as large."""
-    from PIL import Image  # a requirement of matplotlib
-
-    with Image.open(path) as picture:
-        picture.convert("RGB").quantize(64, dither=Image.Dither.NONE).save(path, optimize=True)
-
-
-def _axes(figure: Any, panel: Any, count: int = 1, **more: Any) -> Any:
-    """Axes below each other, so narrow that a phone can show them."""
+def _fill(figure: Any, *, panel: Any, sources: Sources) -> None:
+    """Axes below each other, so narrow that a phone can show them, a head, and one legend."""
+    kind, count = KINDS[panel.kind]
     figure.set_size_inches(5.0, 3.7 if count == 1 else 1.2 + 2.2 * count)
     figure.set_dpi(160)
-    made = figure.subplots(count, 1, squeeze=False, sharex=True, **more)[:, 0]
-    made[-1].set_xlabel(panel.x)
-    for axes in made:
+    every = figure.subplots(count, 1, squeeze=False, sharex=True)[:, 0]
+    every[-1].set_xlabel(panel.x)
+    for axes in every:
         axes.set_ylabel(panel.y)
-    return made
-
-
-def _finish(figure: Any, panel: Any, lines: Sequence[str] = (), *, columns: int = 1) -> None:
-    """The head of a figure, and one legend below it."""
+    lines = kind(every if count > 1 else every[0], panel, sources) or []
     numbers = [one.removeprefix("specimen") for one in panel.specimens if "specimen" in one]
     of = f", specimen{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}" if numbers else ""
     head = f"Figure {panel.figure}{of}: {panel.text}" if panel.figure[0].isdigit() else panel.text
     figure.suptitle("\n".join([head, *lines]), fontsize=9, x=0.02, ha="left")
     entries = [axes.get_legend_handles_labels() for axes in figure.axes]
-    once = {
-        name: line for lines, names in entries for line, name in zip(lines, names, strict=True)
-    }
+    once = {name: line for pair in entries for line, name in zip(*pair, strict=True)}
     if once:
-        place = {"loc": "outside lower center", "ncols": columns, "fontsize": 9}
+        place = {"loc": "outside lower center", "ncols": min(count, 2), "fontsize": 9}
         figure.legend([*once.values()], [*once], **place)
 
 
-def _stairs(
-    axes: Any, edges: Array, rows: Any, *, colour: str, label: str, line: Any = "-"
-) -> None:
+def _stairs(axes: Any, edges: Array, rows: Any, *, color: str, **style: Any) -> None:
     """Steps of the mean of `rows` (S, B), one a seed, between `edges` (B+1,), with their range."""
     rows = np.atleast_2d(np.asarray(rows, float))
-    style: Any = {"color": colour, "linestyle": line, "linewidth": 2}
-    axes.stairs(rows.mean(axis=0), edges, baseline=None, label=label, **style)
+    axes.stairs(rows.mean(axis=0), edges, baseline=None, linewidth=2, color=color, **style)
     if len(rows) > 1:
         low, high = (np.append(one, one[-1]) for one in (rows.min(axis=0), rows.max(axis=0)))
-        axes.fill_between(edges, low, high, step="post", color=colour, alpha=0.2, linewidth=0)
+        axes.fill_between(edges, low, high, step="post", color=color, alpha=0.2, linewidth=0)
 
 
 def _style(runs: Sequence[Run]) -> dict[str, str]:
@@ -124,7 +93,7 @@ def _style(runs: Sequence[Run]) -> dict[str, str]:
     radii = dict.fromkeys(runs[0].state.case.fines.radius_range_m)
     across = "–".join(f"{2e3 * one:.3g}" for one in radii)
     seeds = f", {len(runs)} seeds" if len(runs) > 1 else ""
-    return {"colour": COLOURS[int(number)], "label": f"{number}: fines {across} mm{seeds}"}
+    return {"color": COLOURS[int(number)], "label": f"{number}: fines {across} mm{seeds}"}
 
 
 # ---- The kinds of plot.
@@ -143,17 +112,15 @@ def _by_depth(run: Run, name: str) -> tuple[Array, Array]:
     return edges, np.histogram(depth, edges, weights=weight)[0]
 
 
-def _depth(figure: Any, panel: Any, sources: Sources) -> None:
+def _depth(axes: Any, panel: Any, sources: Sources) -> None:
     """A quantity along depth, one curve a specimen or a quantity; marks of the thesis."""
-    (axes,) = _axes(figure, panel)
-    edges = np.zeros(1)
     for specimen in panel.specimens:
         runs, thesis = sources.runs[specimen], thesis_of(specimen)
         for name, colour in zip(panel.names, (BLUE, ORANGE), strict=False):
             edges = _by_depth(runs[0], name)[0]
-            several = len(panel.names) > 1
-            style = {"colour": colour, "label": name} if several else _style(runs)
+            style = {"color": colour, "label": name} if len(panel.names) > 1 else _style(runs)
             _stairs(axes, edges, [_by_depth(run, name)[1] for run in runs], **style)
+            axes.set_xlim(0, edges[-1])
     if len(panel.specimens) == 1 and panel.names[0] == LOST:
         whole, face = thesis["porosity_loss"], thesis.get("face_porosity_loss")
         label = f"thesis, whole specimen: {whole:.2g}"
@@ -165,14 +132,11 @@ def _depth(figure: Any, panel: Any, sources: Sources) -> None:
         axes.axvline(deep, color="black", linestyle=":", label=f"thesis, depth {deep:g} mm")
         if first is not None:
             axes.plot(0.25, first, label="thesis, its first bin: about", **MARK)
-    axes.set_xlim(0, edges[-1])
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    _finish(figure, panel)
 
 
-def _density(figure: Any, panel: Any, sources: Sources) -> None:
+def _density(axes: Any, panel: Any, sources: Sources) -> list[str]:
     """Probability density of quantities of pores and throats, and the thesis's shares."""
-    (axes,) = _axes(figure, panel)
     (specimen,), names = panel.specimens, panel.names
     sections = [first_section(run, WHOLE) for run in sources.runs[specimen]]
     every = np.concatenate([v[w > 0] for v, w in (weighted(one, names[0]) for one in sections)])
@@ -188,28 +152,34 @@ def _density(figure: Any, panel: Any, sources: Sources) -> None:
         pairs = [weighted(section, name) for section in sections]
         rows = [np.histogram(np.maximum(v, 0.0), edges, weights=w)[0] / w.sum() for v, w in pairs]
         label = f"{name}, {np.mean([w.sum() for _, w in pairs]):.0f} a seed"
-        _stairs(axes, edges, rows / np.diff(scale(edges)), colour=colour, label=label, line=line)
-    lines = []
-    for (name, between), one in statistics_of(specimen).items():
-        if name in names or (names[0] == POROSITY and "throats with" in name):
-            ours = np.mean([measure(section, name, between)[0] for section in sections])
-            span = f" {between[0]:g}–{between[1]:g} {FIELDS[name][0]}".rstrip() if between else ""
-            given = f"{one['sense']} {100 * one['value']:g} %".replace("exact ", "")
-            lines.append(f"{name}{span}: {100 * ours:.2g} % (thesis {given})")
+        style: Any = {"color": colour, "label": label, "linestyle": line}
+        _stairs(axes, edges, rows / np.diff(scale(edges)), **style)
     axes.set(xlim=edges[[0, -1]])
     axes.set_ylim(bottom=0)
-    _finish(figure, panel, lines)
+    lines = []
+    for (name, between), one in known.statistics_of(specimen).items():
+        if name in names or (names[0] == POROSITY and "throats with" in name):
+            ours = np.mean([measure(section, name, between)[0] for section in sections])
+            span = (
+                f" {between[0]:g}–{between[1]:g} {quantities.FIELDS[name][0]}".rstrip()
+                if between
+                else ""
+            )
+            given = f"{one['sense']} {100 * one['value']:g} %".replace("exact ", "")
+            lines.append(f"{name}{span}: {100 * ours:.2g} % (thesis {given})")
+    return lines
 
 
 def _distances(panel: Any, sources: Sources) -> Array:
     between = (float(panel.names[0]), float(panel.names[1]))
     sections = [first_section(run, WHOLE) for run in sources.runs[panel.specimens[0]]]
-    return np.concatenate([fines_in_class(one, between)["distance"] for one in sections])
+    return np.concatenate(
+        [quantities.fines_in_class(one, between)["distance"] for one in sections]
+    )
 
 
-def _distance(figure: Any, panel: Any, sources: Sources) -> None:
+def _distance(axes: Any, panel: Any, sources: Sources) -> list[str]:
     """Where fines sit in throats: nearer the axis, nearer the wall, centred beyond it."""
-    (axes,) = _axes(figure, panel)
     values, edges = _distances(panel, sources), np.linspace(0.0, 2.0, 21)
     height = np.histogram(values, edges)[0] / len(values)
     words = ("nearer the axis", "nearer the wall", "centred beyond the wall")
@@ -219,16 +189,16 @@ def _distance(figure: Any, panel: Any, sources: Sources) -> None:
         label = f"{word}: {100 * one:.2g} %"
         axes.bar(edges[part], height[part], 0.1, align="edge", color=colour, label=label)
     lines = [f"{len(values)} fines"]
-    for claim in published()["deposition"]:
+    for claim in known.published()["deposition"]:
         if claim["throat_porosity"] == [float(one) for one in panel.names] and "nearer" in claim:
             share = f"{claim['sense']} {100 * claim['value']:g} %"
             lines.append(f"thesis: {share} nearer the {claim['nearer']}")
-    _finish(figure, panel, lines)
+    return lines
 
 
-def _sections(figure: Any, panel: Any, sources: Sources) -> None:
-    """k / k0 of sections by the thesis's laws (left) and fdnet's (right), and in the thesis."""
-    for axes, laws in zip(_axes(figure, panel, 2), ("thesis", "own"), strict=True):
+def _sections(every: Any, panel: Any, sources: Sources) -> None:
+    """k / k0 of sections by the thesis's laws (above) and fdnet's (below), and in the thesis."""
+    for axes, laws in zip(every, ("thesis", "own"), strict=True):
         for specimen in panel.specimens:
             runs, style = sources.runs[specimen], _style(sources.runs[specimen])
             slabs = [getattr(run, laws).sections for run in runs]
@@ -236,21 +206,20 @@ def _sections(figure: Any, panel: Any, sources: Sources) -> None:
             for where, line in (("", "-"), ("_inplace", ":")):
                 after, before = (attrgetter(f"k_{one}{where}") for one in ("damaged", "initial"))
                 rows = [[after(slab) / before(slab) for slab in one] for one in slabs]
-                _stairs(axes, edges, rows, line=line, **style | ({"label": ""} if where else {}))
+                more = {"linestyle": line} | ({"label": ""} if where else {})
+                _stairs(axes, edges, rows, **style | more)
             given = 1.0 - np.array(reductions(thesis_of(specimen)))
             if laws == "thesis" and len(given):
-                mark = MARK | {"color": style["colour"], "label": "thesis"}
+                mark = MARK | {"color": style["color"], "label": "thesis"}
                 axes.plot(np.arange(len(given)) + 0.5, given, **mark)
         axes.plot([], [], ":", color=GREY, label="in place")
         axes.set(xlim=(0, edges[-1]), ylim=(0, 1.05))
-        words = {"thesis": "by the thesis's laws", "own": "by fdnet's laws"}
-        axes.set_title(words[laws], fontsize=9, loc="left")
-    _finish(figure, panel, columns=2)
+        title = "by the thesis's laws" if laws == "thesis" else "by fdnet's laws"
+        axes.set_title(title, fontsize=9, loc="left")
 
 
-def _bars(figure: Any, panel: Any, sources: Sources) -> None:
+def _bars(axes: Any, panel: Any, sources: Sources) -> None:
     """A bar of each quantity a specimen, with the range over seeds, and the thesis's loss."""
-    (axes,) = _axes(figure, panel)
     places, runs = np.arange(len(panel.specimens)), [sources.runs[o] for o in panel.specimens]
     for name, shift, colour in zip(panel.names, (-0.2, 0.2), (BLUE, ORANGE), strict=True):
         rows = [values_of(sources.results, one[0].item.name, name) for one in runs]
@@ -264,14 +233,13 @@ def _bars(figure: Any, panel: Any, sources: Sources) -> None:
     axes.set_xticks(places, [_style(one[:1])["label"].replace(": ", ":\n") for one in runs])
     axes.tick_params(axis="x", labelsize=9)
     axes.grid(axis="x", visible=False)
-    _finish(figure, panel)
 
 
-def _scan(figure: Any, panel: Any, sources: Sources) -> None:
+def _scan(every: Any, panel: Any, sources: Sources) -> None:
     """Quantities against what is scanned, one curve a case, with the range over its seeds."""
     (group,) = panel.specimens
     plan = [one for one in points() if one.group == group]
-    for axes, name in zip(_axes(figure, panel, 3), panel.names, strict=True):
+    for axes, name in zip(every, panel.names, strict=True):
         for case in dict.fromkeys(one.name for one in plan):
             seeds = {one.seed for one in plan if one.name == case}
             rows = sources.results[sources.results.seed.isin(seeds)]
@@ -289,7 +257,6 @@ def _scan(figure: Any, panel: Any, sources: Sources) -> None:
         axes.set_ylim(bottom=0)
         unit = QUANTITIES[name].unit
         axes.set_ylabel(f"{name} ({unit})" if unit else name, fontsize=8)
-    _finish(figure, panel, columns=2)
 
 
 # ---- Spheres seen from the side.
@@ -313,7 +280,7 @@ def _colours(spheres: Snapshot, by_size: bool) -> Array:
     return colours
 
 
-def _paint(axes: Any, spheres: Snapshot, *, by_size: bool = False) -> None:
+def _paint(axes: Any, spheres: Snapshot, *, by_size: bool) -> None:
     """Circles of the spheres, near ones over far ones, with the face dashed."""
     from matplotlib.collections import EllipseCollection
 
@@ -331,20 +298,19 @@ def _paint(axes: Any, spheres: Snapshot, *, by_size: bool = False) -> None:
     axes.grid(False)
 
 
-def _spheres(figure: Any, panel: Any, sources: Sources) -> None:
+def _spheres(axes: Any, panel: Any, sources: Sources) -> list[str]:
     """The pack, a slab of the invaded pack, or the invaded fines by size."""
-    (axes,) = _axes(figure, panel)
     run, what = sources.runs[panel.specimens[0]][0], panel.names[0]
-    fines, words = run.state.damaged.fines(), f"{run.thesis.invaded_count:,} invaded fines"
     if what == "pack":
-        spheres, words = run.state.grains, f"{len(run.state.grains):,} grains"
-    elif what == "slab":
-        spheres = middle_slab(run.state.damaged)
-    else:
-        spheres = fines.where(fines.position[:, 0] >= fines.box[0, 0])
-    _paint(axes, spheres, by_size=what == "sizes")
-    _finish(figure, panel, [words])
+        _paint(axes, run.state.grains, by_size=False)
+        return [f"{len(run.state.grains):,} grains"]
+    fines, slab = run.state.damaged.fines(), middle_slab(run.state.damaged)
+    inside = fines.where(fines.position[:, 0] >= fines.box[0, 0])
+    _paint(axes, slab if what == "slab" else inside, by_size=what == "sizes")
+    return [f"{run.thesis.invaded_count:,} invaded fines"]
 
 
-_ALL = (_depth, _density, _distance, _sections, _bars, _scan, _spheres)
-KINDS: Mapping[str, Callable[..., None]] = {one.__name__[1:]: one for one in _ALL}
+_ALL = (_depth, _density, _distance, _bars, _spheres)
+KINDS: dict[str, tuple[Callable[..., Any], int]] = {one.__name__[1:]: (one, 1) for one in _ALL}
+KINDS |= {"sections": (_sections, 2), "scan": (_scan, 3)}
+"""The function of each kind of plot, and the number of its axes."""

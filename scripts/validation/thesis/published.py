@@ -3,24 +3,23 @@
 Lengths are in mm, volumes in mm3; everything else is a fraction or a count.
 """
 
-import csv
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
+import pandas as pd
+
 TABLE3 = "table3"
-SPECIMENS = tuple(f"specimen{number}" for number in range(1, 9))
 Between = tuple[float, float] | None
 """(low, high) of a range [low, high); None for a quantity itself."""
 
 
 def rows_in(name: str) -> list[Any]:
     """The rows of a table next to this module, with a column of texts as an attribute each."""
-    with Path(__file__).with_name(name).open(newline="", encoding="utf-8") as file:
-        return [SimpleNamespace(**row) for row in csv.DictReader(file)]
+    table = pd.read_csv(Path(__file__).with_name(name), dtype=str, keep_default_na=False)
+    return [*table.itertuples(index=False)]
 
 
 @cache
@@ -35,17 +34,13 @@ def published() -> Mapping[str, Any]:
 
 
 def specimen_of(run: str) -> str:
-    """The specimen that a run is compared with, "" where there is none.
-
-    "specimen5" for "specimen5", "specimen5-5to6", "quick-specimen5" and "specimen5 set=1".
-    """
-    name = run.removeprefix("quick-").split(" ")[0].split("-")[0]
-    return name if name in published()["specimens"] else ""
+    """The specimen of a run, such as "quick-specimen5", "specimen5-5to6" or "specimen5 set=1"."""
+    return run.removeprefix("quick-").split(" ")[0].split("-")[0]
 
 
 def thesis_of(run: str) -> Mapping[str, Any]:
-    """The thesis's numbers of the run's specimen; empty where there are none."""
-    return published()["specimens"].get(specimen_of(run), {})
+    """The thesis's numbers of the run's specimen."""
+    return published()["specimens"][specimen_of(run)]
 
 
 def reductions(one: Mapping[str, Any]) -> Sequence[float]:

@@ -1,31 +1,24 @@
 """What is measured on each run, and on its first millimetre.
 
-RUN holds numbers of a whole run, FIELDS sizes of each pore or throat of the first millimetre,
-SINGLES numbers of that section, which the thesis examines in section 3.3 (Shi 2011).
+FIELDS holds sizes of each pore or throat of the first millimetre, SINGLES numbers of that
+section, which the thesis examines in section 3.3 (Shi 2011).
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.stats import binomtest
 
-from fdnet.errors import CaseError
 from fdnet.names import ALL_SPHERES, DEFAULT_LAW
 from fdnet.network.flow.sections import reduction
 from fdnet.network.laws.damage import CLOGGING, DEPOSITION
 from fdnet.network.network import Network
 from fdnet.network.permeability import Analysis, compare
 from fdnet.spheres.snapshot import Array
-from validation.thesis.published import (
-    Between,
-    key_of,
-    published,
-    reductions,
-    statistics_of,
-    thesis_of,
-)
+from validation.thesis import published as known
 from validation.thesis.runs import Planned, State
 
 MM, SECTIONS = 1e-3, 8
@@ -49,17 +42,10 @@ class Run:
 
 
 def examine(item: Planned, state: State) -> Run:
-    """Analyse a state with the sections and bins of its case.
-
-    Raises NetworkError on degenerate geometry, FlowError on a solve that fails its checks.
-    """
-    thesis, own = compare(
-        state.grains,
-        state.damaged,
-        periodic=state.case.periodic,
-        options=state.case.analysis,
-        laws=[("thesis", "thesis"), (DEFAULT_LAW, ALL_SPHERES)],
-    )
+    """Analyse a state with the sections and bins of its case."""
+    laws = [("thesis", "thesis"), (DEFAULT_LAW, ALL_SPHERES)]
+    how: Any = {"periodic": state.case.periodic, "options": state.case.analysis}
+    thesis, own = compare(state.grains, state.damaged, laws=laws, **how)
     return Run(item=item, state=state, thesis=thesis, own=own)
 
 
@@ -73,94 +59,75 @@ def share(part: Array, weights: Any = 1.0) -> float:
 # ---- Numbers of a whole run: results.csv.
 def deep_near_wall(run: Run) -> float:
     """Share of the fines beyond 1 mm centred within a mean grain radius of a side wall."""
-    (low, high), *sides = run.state.damaged.box
-    place = run.state.damaged.fines().position
-    place = place[(place[:, 0] >= low + MM) & (place[:, 0] < high)]
-    to_wall = [np.minimum(place[:, i] - a, b - place[:, i]) for i, (a, b) in enumerate(sides, 1)]
-    near = np.minimum(*to_wall) < run.state.case.grains.mean_radius_m
+    box, place = run.state.damaged.box, run.state.damaged.fines().position
+    place = place[(place[:, 0] >= box[0, 0] + MM) & (place[:, 0] < box[0, 1])]
+    to_wall = np.minimum(place - box[:, 0], box[:, 1] - place)[:, 1:].min(axis=1)
+    near = to_wall < run.state.case.grains.mean_radius_m
     return math.nan if any(run.state.case.periodic) else share(near)
 
 
-def _told(name: str) -> Callable[[Run, Analysis], float]:
-    """A number of the thesis; its counts only for specimens of its size."""
-
-    def reported(run: Run, _: Analysis) -> float:
-        value = thesis_of(run.item.id).get(name, math.nan)
-        quick = "count" in name and run.item.group == "quick"
-        return math.nan if quick else float(value[0] if isinstance(value, list) else value)
-
-    return reported
-
-
-RUN: Mapping[str, Callable[[Run, Analysis], Any]] = {
-    "id": lambda run, a: run.item.id,
-    "seed": lambda run, a: run.item.seed,
-    "digest": lambda run, a: run.state.case.digest(),
-    "law": lambda run, a: a.law,
-    "damage_law": lambda run, a: a.damage_law,
-    "porosity_initial": lambda run, a: a.porosity_initial,
-    "porosity_damaged": lambda run, a: a.porosity_damaged,
-    "porosity_loss_first_mm": lambda run, a: (
-        a.sections[0].porosity_initial - a.sections[0].porosity_damaged
-    ),
-    "invaded_count": lambda run, a: a.invaded_count,
-    "count_first_mm": lambda run, a: int(np.sum(run.depth < MM)),
-    "invasion_depth_mm": lambda run, a: 1e3 * a.invasion_depth,
-    "invasion_depth_p95_mm": lambda run, a: 1e3 * a.invasion_depth_p95,
-    "mean_depth_mm": lambda run, a: 1e3 * float(run.depth.mean()) if len(run.depth) else math.nan,
-    "fraction_first_0p25mm": lambda run, a: share(run.depth < 0.25 * MM),
-    "fraction_first_mm": lambda run, a: share(run.depth < MM),
-    "fraction_beyond_0p5mm": lambda run, a: share(run.depth >= 0.5 * MM),
-    "fraction_deep_near_wall": lambda run, a: deep_near_wall(run),
-    "k_reduction": lambda run, a: a.k_reduction,
-    "*k_reduction": lambda run, a: [one.k_reduction for one in a.sections],
-    "*k_reduction_inplace": lambda run, a: [
-        reduction(one.k_initial_inplace, one.k_damaged_inplace) for one in a.sections
-    ],
-    "k_initial_m2": lambda run, a: a.k_initial,
-    "k_damaged_m2": lambda run, a: a.k_damaged,
-    "throats": lambda run, a: len(a.network.throat_radius),
-    "throats_blocked": lambda run, a: 0 if a.occupancy is None else int(a.occupancy.blocked.sum()),
-    "supplied_count": lambda run, a: run.state.ending["supplied"],
-    "passed_count": lambda run, a: run.state.ending["passed"],
-    "cake_thickness_mm": lambda run, a: 1e3 * a.cake_thickness,
-    "stop_reason": lambda run, a: run.state.ending["stop_reason"],
-    "time_ms": lambda run, a: 1e3 * run.state.ending["steps"] * run.state.ending["dt_s"],
-    "seconds": lambda run, a: float(run.state.ending["seconds"]),
-    "pack_seconds": lambda run, a: float(run.state.ending["pack_seconds"]),
-    "max_overlap": lambda run, a: float(run.state.ending["max_overlap"]),
-    "thesis_damaged_porosity": _told("damaged_porosity"),
-    "thesis_depth_mm": _told("invaded_depth_mm"),
-    "thesis_invaded_count": _told("invaded_count"),
-    "*thesis_k_reduction": lambda run, a: reductions(thesis_of(run.item.id)),
-    "thesis_fraction_first_bin": _told("fraction_first_bin"),
-    "thesis_fraction_beyond_0p5mm": _told("fraction_beyond_0p5mm"),
-    "thesis_face_porosity_loss": _told("face_porosity_loss"),
-    "thesis_count_first_mm": _told("count_first_mm"),
-}
-"""Columns of results.csv; a star marks one of each section, NAME_1 to NAME_8.
-
-Porosity counts overlap once; shares of fines are by number; reductions are 1 - k/k0, of sections
-cut out of the specimen, and in place by the pressures of the whole.
-"""
-
-
 def result_rows(run: Run) -> list[dict[str, Any]]:
-    """One row for each pair of laws. Raises CaseError on more than 8 sections."""
-    if len(run.thesis.sections) > SECTIONS:
-        raise CaseError(f"{run.item.id}: analysis.sections: results.csv has room for {SECTIONS}")
-    rows: list[dict[str, Any]] = []
-    for analysis in (run.thesis, run.own):
-        rows.append({})
-        for name, value in RUN.items():
-            one = value(run, analysis)
-            if name[0] == "*":
-                filled = [*one, *[None] * SECTIONS][:SECTIONS]
-                known = [math.nan if value is None else value for value in filled]
-                rows[-1] |= {f"{name[1:]}_{i}": value for i, value in enumerate(known, 1)}
-            else:
-                rows[-1][name] = one
-    return rows
+    """Rows of results.csv, one for each pair of laws; NAME_1 to NAME_8 are those of the sections.
+
+    Porosity counts overlap once; shares of fines are by number; reductions are 1 - k/k0, of
+    sections cut out of the specimen, and in place by the pressures of the whole. Counts of the
+    thesis are for specimens of its size alone.
+    """
+    return [_row(run, analysis) for analysis in (run.thesis, run.own)]
+
+
+def _row(run: Run, a: Analysis) -> dict[str, Any]:
+    depth, end, told = run.depth, run.state.ending, known.thesis_of(run.item.id)
+    counts = {} if run.item.group == "quick" else told
+    inplace = [reduction(one.k_initial_inplace, one.k_damaged_inplace) for one in a.sections]
+    first = a.sections[0]
+    return {
+        "id": run.item.id,
+        "seed": run.item.seed,
+        "digest": run.state.case.digest(),
+        "law": a.law,
+        "damage_law": a.damage_law,
+        "porosity_initial": a.porosity_initial,
+        "porosity_damaged": a.porosity_damaged,
+        "porosity_loss_first_mm": first.porosity_initial - first.porosity_damaged,
+        "invaded_count": a.invaded_count,
+        "count_first_mm": int(np.sum(depth < MM)),
+        "invasion_depth_mm": 1e3 * a.invasion_depth,
+        "invasion_depth_p95_mm": 1e3 * a.invasion_depth_p95,
+        "mean_depth_mm": 1e3 * float(depth.mean()) if len(depth) else math.nan,
+        "fraction_first_0p25mm": share(depth < 0.25 * MM),
+        "fraction_first_mm": share(depth < MM),
+        "fraction_beyond_0p5mm": share(depth >= 0.5 * MM),
+        "fraction_deep_near_wall": deep_near_wall(run),
+        "k_reduction": a.k_reduction,
+        **_numbered("k_reduction", [one.k_reduction for one in a.sections]),
+        **_numbered("k_reduction_inplace", inplace),
+        "k_initial_m2": a.k_initial,
+        "k_damaged_m2": a.k_damaged,
+        "throats": len(a.network.throat_radius),
+        "throats_blocked": 0 if a.occupancy is None else int(a.occupancy.blocked.sum()),
+        "supplied_count": end["supplied"],
+        "passed_count": end["passed"],
+        "cake_thickness_mm": 1e3 * a.cake_thickness,
+        "stop_reason": end["stop_reason"],
+        "time_ms": 1e3 * end["steps"] * end["dt_s"],
+        "seconds": float(end["seconds"]),
+        "pack_seconds": float(end["pack_seconds"]),
+        "max_overlap": float(end["max_overlap"]),
+        "thesis_damaged_porosity": told.get("damaged_porosity", [math.nan])[0],
+        "thesis_depth_mm": float(told.get("invaded_depth_mm", math.nan)),
+        "thesis_invaded_count": float(counts.get("invaded_count", math.nan)),
+        **_numbered("thesis_k_reduction", known.reductions(told)),
+        "thesis_fraction_first_bin": told.get("fraction_first_bin", math.nan),
+        "thesis_fraction_beyond_0p5mm": told.get("fraction_beyond_0p5mm", math.nan),
+        "thesis_face_porosity_loss": told.get("face_porosity_loss", math.nan),
+        "thesis_count_first_mm": float(counts.get("count_first_mm", math.nan)),
+    }
+
+
+def _numbered(name: str, values: Sequence[float | None]) -> dict[str, float]:
+    filled = [*values, *[None] * SECTIONS][:SECTIONS]
+    return {f"{name}_{i}": math.nan if v is None else v for i, v in enumerate(filled, 1)}
 
 
 # ---- The first millimetre: statistics.csv.
@@ -168,34 +135,16 @@ WHOLE = "pores of four grains, throats between two such"
 CUT = "with those cut by a face, by the part inside"
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Section:
+class Section(NamedTuple):
     """Pores (P) and throats (T) of a run, weighted for the first millimetre by WHOLE or CUT.
 
     The weight of "pore" and "throat" is 1 for one that counts whole and 0 for one elsewhere.
     """
 
-    reading: str
-    weight: Mapping[str, Array]
     run: Run
-
-    @property
-    def network(self) -> Network:
-        """Pores and throats of the whole specimen."""
-        return self.run.thesis.network
-
-    @property
-    def fines(self) -> Any:
-        """What the fines fill. Raises CaseError without fines."""
-        if self.run.thesis.occupancy is None:
-            raise CaseError(f"{self.run.item.id}: holds no fines; examine an invaded specimen")
-        return self.run.thesis.occupancy
-
-    @property
-    def throat_depth(self) -> Array:
-        """(T,) m, depth of the middle of each throat of the specimen."""
-        middle = self.network.throat_ends[:, :, 0].mean(axis=1)
-        return np.asarray(middle - self.network.box[0, 0])
+    network: Network
+    fines: Any
+    weight: Mapping[str, Array]
 
 
 def first_section(run: Run, reading: str) -> Section:
@@ -213,8 +162,14 @@ def first_section(run: Run, reading: str) -> Section:
     if reading == WHOLE:
         pores = (network.pore_share == 1.0).astype(float)
         throats = pores[network.throat_pores].all(axis=1).astype(float)
-    pores, throats = np.where(pore, pores, 0.0), np.where(throat, throats, 0.0)
-    return Section(reading=reading, weight={"pore": pores, "throat": throats}, run=run)
+    weight = {"pore": np.where(pore, pores, 0.0), "throat": np.where(throat, throats, 0.0)}
+    return Section(run, network, run.thesis.occupancy, weight)
+
+
+def throat_depth(section: Section) -> Array:
+    """(T,) mm, depth of the middle of each throat of the specimen."""
+    network = section.network
+    return np.asarray(1e3 * (network.throat_ends[:, :, 0].mean(axis=1) - network.box[0, 0]))
 
 
 POROSITY = "porosity of throats with fines"
@@ -233,7 +188,7 @@ FIELDS: Mapping[str, tuple[str, str, Callable[[Section], Array]]] = {
         "pore",
         lambda s: 1e9 * (s.network.pore_volume - s.fines.pore_solid_volume),
     ),
-    "throat depth": ("mm", "throat", lambda s: 1e3 * s.throat_depth),
+    "throat depth": ("mm", "throat", throat_depth),
     POROSITY: ("", "throat", lambda s: s.fines.throat_porosity),
     "conductance": ("mm3", "throat", lambda s: 1e9 * s.run.thesis.conductance_initial),
     "conductance with fines": ("mm3", "throat", lambda s: 1e9 * s.run.thesis.conductance_damaged),
@@ -268,24 +223,23 @@ def _filled(section: Section, what: str) -> float:
     return 1e9 * float(np.sum(section.weight[what] * solid))
 
 
-def _free(section: Section, what: str) -> float:
-    """Share of throats' cylinders, or of pore bodies, that no fine fills."""
+def _free(section: Section, what: str, volume: Array) -> float:
+    """Share of the `volume` of throats' cylinders, or of pore bodies, that no fine fills."""
+    return 1.0 - _filled(section, what) / (1e9 * float(np.sum(section.weight[what] * volume)))
+
+
+def _free_of_throats(section: Section) -> float:
     network = section.network
-    whole = network.pore_volume
-    if what == "throat":
-        whole = np.pi * network.throat_radius**2 * network.throat_length
-    total = 1e9 * float(np.sum(section.weight[what] * whole))
-    return 1.0 - _filled(section, what) / total if total > 0 else math.nan
+    return _free(section, "throat", np.pi * network.throat_radius**2 * network.throat_length)
 
 
 def _mean_porosity(section: Section) -> float:
     values, weights = weighted(section, POROSITY)
-    return float(np.average(values, weights=weights)) if weights.any() else math.nan
+    return float(np.average(values, weights=weights))
 
 
 def _in_throats(section: Section) -> float:
-    both = _filled(section, "throat") + _filled(section, "pore")
-    return _filled(section, "throat") / both if both > 0 else math.nan
+    return _filled(section, "throat") / (_filled(section, "throat") + _filled(section, "pore"))
 
 
 SINGLES: Mapping[str, tuple[str, Callable[[Section], float]]] = {
@@ -297,8 +251,8 @@ SINGLES: Mapping[str, tuple[str, Callable[[Section], float]]] = {
         lambda s: float(np.sum((s.weight["throat"] > 0) & (s.network.throat_radius == 0))),
     ),
     "mean porosity of throats with fines": ("", _mean_porosity),
-    "overall throat porosity": ("", lambda s: _free(s, "throat")),
-    "overall pore-body porosity": ("", lambda s: _free(s, "pore")),
+    "overall throat porosity": ("", _free_of_throats),
+    "overall pore-body porosity": ("", lambda s: _free(s, "pore", s.network.pore_volume)),
     "volume of fines in throats": ("mm3", lambda s: _filled(s, "throat")),
     "volume of fines in pore bodies": ("mm3", lambda s: _filled(s, "pore")),
     "share of throats in the volume of fines": ("share", _in_throats),
@@ -306,7 +260,7 @@ SINGLES: Mapping[str, tuple[str, Callable[[Section], float]]] = {
 """Numbers of a section, with their units."""
 
 
-def measure(section: Section, quantity: str, between: Between) -> tuple[float, str]:
+def measure(section: Section, quantity: str, between: known.Between) -> tuple[float, str]:
     """One of SINGLES with its unit, or the share of one of FIELDS in a range."""
     if between is None:
         unit, value = SINGLES[quantity]
@@ -321,25 +275,18 @@ def statistics(run: Run) -> Iterator[dict[str, Any]]:
     Each is measured by the readings WHOLE and CUT. Rows of the section's grains tessellated alone,
     the thesis's own reading, were made by an earlier script.
     """
-    wanted = dict.fromkeys(key_of(one) for one in published()["statistic"])
+    wanted = dict.fromkeys(known.key_of(one) for one in known.published()["statistic"])
     for reading in (WHOLE, CUT):
         section = first_section(run, reading)
         for quantity, between in wanted:
             words, (ours, unit) = quantity, measure(section, quantity, between)
             if between is not None:
                 words += f" {between[0]:g} to {between[1]:g} {FIELDS[quantity][0]}"
-            one = statistics_of(run.item.id).get((quantity, between), {})
-            yield {
-                "id": run.item.id,
-                "seed": run.item.seed,
-                "source": one.get("source", ""),
-                "quantity": words.strip(),
-                "ours": ours,
-                "thesis": one.get("value", math.nan),
-                "sense": one.get("sense", ""),
-                "unit": unit,
-                "note": f"{reading}; {one['note']}" if one.get("note") else reading,
-            }
+            one = known.statistics_of(run.item.id).get((quantity, between), {})
+            row = {"id": run.item.id, "seed": run.item.seed, "source": one.get("source", "")}
+            row |= {"quantity": words.strip(), "ours": ours, "thesis": one.get("value", math.nan)}
+            row |= {"sense": one.get("sense", ""), "unit": unit}
+            yield row | {"note": "; ".join(filter(None, (reading, one.get("note"))))}
 
 
 # ---- Where fines sit in throats (Shi 2011, Figures 56 and 57): deposition.csv.
@@ -365,8 +312,8 @@ def deposition(run: Run) -> Iterator[dict[str, Any]]:
     independent, which fines of one throat are not quite.
     """
     section = first_section(run, WHOLE)
-    for claim in published()["deposition"]:
-        reported = claim if run.item.name.startswith("specimen5") else {}
+    for claim in known.published()["deposition"]:
+        told = claim if run.item.name.startswith("specimen5") else {}
         fines = fines_in_class(section, claim["throat_porosity"])
         near, far = fines["distance"] < 0.5, fines["distance"] > 1.0
         parts = {"nearer_axis": near, "nearer_wall": ~near & ~far, "beyond_wall": far}
@@ -374,37 +321,14 @@ def deposition(run: Run) -> Iterator[dict[str, Any]]:
         shares = {name: share(part, weight) for name, part in parts.items()}
         for name, part in parts.items():
             shares[f"{name}_volume"] = share(part, weight * fines["volume"])
-        wall = 1.0 - shares["nearer_axis"]
-        low, high = wilson_interval(wall * total, total)
-        yield {
-            "id": run.item.id,
-            "seed": run.item.seed,
-            "low": claim["throat_porosity"][0],
-            "high": claim["throat_porosity"][1],
-            "whole": True,
-            "throats": float(np.sum(section.weight["throat"][np.unique(fines["throat"])])),
-            "fines": total,
-            **shares,
-            "wall_low": low,
-            "wall_high": high,
-            "law": "" if not total else DEPOSITION if wall > 0.5 else CLOGGING,
-            "decided": low > 0.5 or high < 0.5,
-            "nearer": reported.get("nearer", ""),
-            "thesis": reported.get("value", math.nan),
-            "sense": reported.get("sense", ""),
-            "source": claim["source"],
-        }
-
-
-def wilson_interval(part: float, total: float) -> tuple[float, float]:
-    """The 95 % interval of a share of weighted sums; nan without any.
-
-    Source: Wilson 1927, J. Am. Stat. Assoc. 22, 209.
-    """
-    if total <= 0:
-        return math.nan, math.nan
-    z = 1.959963984540054
-    square, portion = z**2 / total, part / total
-    spread = z * math.sqrt(part * (total - part) / total + 0.25 * z**2) / total
-    low, high = ((portion + 0.5 * square + one) / (1.0 + square) for one in (-spread, spread))
-    return max(0.0, min(portion, low)), min(1.0, max(portion, high))
+        wall, low, high = 1.0 - shares["nearer_axis"], math.nan, math.nan
+        if total:  # Wilson 1927, J. Am. Stat. Assoc. 22, 209
+            low, high = binomtest(round(wall * total), int(total)).proportion_ci(method="wilson")
+        row = dict(zip(("low", "high"), claim["throat_porosity"], strict=True)) | {"whole": True}
+        row["throats"] = float(np.sum(section.weight["throat"][np.unique(fines["throat"])]))
+        row |= {"fines": total, **shares, "wall_low": low, "wall_high": high}
+        row["law"] = "" if not total else DEPOSITION if wall > 0.5 else CLOGGING
+        row |= {"decided": low > 0.5 or high < 0.5, "nearer": told.get("nearer", "")}
+        row |= {"thesis": told.get("value", math.nan), "sense": told.get("sense", "")}
+        row = {"id": run.item.id, "seed": run.item.seed, **row}
+        yield row | {"source": claim["source"]}

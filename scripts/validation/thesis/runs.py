@@ -1,12 +1,10 @@
 """The runs of the thesis's specimens: their plan, how they are made, and the states kept."""
 
 import json
+import re
 import tomllib
-import zipfile
-import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +13,10 @@ import tomli_w
 
 import fdnet
 from fdnet.case.case import InvasionCase, with_fines
-from fdnet.case.file import case_from, case_path, read_case
+from fdnet.case.file import case_from, case_path, read_case, set_keys
 from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError
-from fdnet.files import write_bytes, write_text
+from fdnet.files import replacing, write_text
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
 from validation.thesis.published import TABLE3, rows_in
 
@@ -29,8 +27,8 @@ class Planned:
     """One run: a shipped case with a seed and perhaps a changed setting, from plan.csv.
 
     The group is "specimen", "variant", "quick", "reason" (what might let more fines in), or what
-    is scanned ("friction", "drag", "supply", with its value). The name of a quick form begins with
-    "quick-". The setting is "key=value"; the consequence is one that follows and is not named.
+    is scanned ("friction", "drag", "supply", with its value). The setting is "key=value"; the
+    consequence is one that follows and is not named.
     """
 
     group: str
@@ -57,78 +55,63 @@ class Planned:
 
     def load(self) -> InvasionCase:
         """Its case."""
-        settings = [f"seed={self.seed}", *self.settings]
-        return with_fines(read_case(case_path(self.name), assignments=settings))
+        seed = f"seed={self.seed}"
+        return with_fines(read_case(case_path(self.name), assignments=[seed, *self.settings]))
 
 
 def points() -> list[Planned]:
     """All rows of plan.csv, one a seed; a scan also has the case itself, at its own value."""
-    rows = [vars(row) for row in rows_in("plan.csv")]
-    return [
-        Planned(seed=int(seed), **{name: text for name, text in row.items() if name != "seeds"})
-        for row in rows
-        for seed in row["seeds"].split()
-    ]
+    rows = [row._asdict() for row in rows_in("plan.csv")]
+    return [Planned(seed=int(one), **row) for row in rows for one in row.pop("seeds").split()]
 
 
 def planned(*, quick: bool = False) -> list[Planned]:
     """All runs, each once, or with `quick` one run of each quick form."""
     if quick:
         return [one for one in points() if one.group == "quick" and one.seed == 1]
-    runs: dict[tuple[str, int], Planned] = {}
+    runs = dict[tuple[str, int], Planned]()
     for one in points():
         runs.setdefault((one.id, one.seed), one)
     return [*runs.values()]
 
 
 # ---- The runs.
-def make_runs(
-    plan: Sequence[Planned], states: Path, runs: Path, *, jobs: int, show: bool
-) -> list[str]:
+def make_runs(plan: Sequence[Planned], states: Path, runs: Path, *, jobs: int) -> list[str]:
     """Make the runs that have no state in `states`; returns what failed, one sentence each.
 
     Cases with the same setting and seeds are one sweep in a folder of `runs`, which goes on where
     it was cut. Two runs with the same invasion (Table 3 and specimen 7) are made once.
     """
     find_binary()
-    runs.mkdir(parents=True, exist_ok=True)
-    sweeps: dict[tuple[Any, ...], list[Planned]] = {}
+    for folder in (states, runs):
+        folder.mkdir(parents=True, exist_ok=True)
+    sweeps: dict[tuple[Any, ...], dict[str, Planned]] = {}
     invasions = set()
     for item in plan:
         invasion = item.load().digest("invade")
         if find_state(states, item) is None and invasion not in invasions:
             seeds = tuple(one.seed for one in plan if one.id == item.id)
-            sweeps.setdefault((item.group, seeds, *item.settings), []).append(item)
+            same = sweeps.setdefault((item.group, seeds, *item.settings), {})
+            same[item.load().digest()] = item
         invasions.add(invasion)
     failed = []
     for (group, seeds, *settings), items in sweeps.items():
-        name = "-".join([group, *map(str, seeds), *settings])
-        name = "".join(one if one.isalnum() or one in ".-" else "-" for one in name)
-        cases = [str(case_path(one)) for one in dict.fromkeys(item.name for item in items)]
-        keys = {key: _value(text) for key, _, text in (one.partition("=") for one in settings)}
+        name = re.sub(r"[^\w.-]|_", "-", "-".join([group, *map(str, seeds), *settings]))
+        cases = [str(case_path(one)) for one in dict.fromkeys(i.name for i in items.values())]
+        keys = set_keys({}, settings)
         sweep = {"name": name, "cases": cases, "seeds": [*seeds], "set": keys}
         file = write_text(runs / f"{name}.toml", tomli_w.dumps(sweep))
         stages = ("pack", "invade", "analyse")
-        fdnet.sweep(file, out=runs / name, jobs=jobs, stages=stages, progress=show)
-        made = {}
+        fdnet.sweep(file, out=runs / name, jobs=jobs, stages=stages, progress=True)
         for folder in (runs / name / "runs").iterdir():
             try:
                 state = state_of_run(folder)
-                made[state.case.digest()] = state
             except CaseError as error:
                 failed.append(str(error))
-        for item in items:
-            if item.load().digest() in made:
-                write_state(states / item.file, made[item.load().digest()])
+                continue
+            if state.case.digest() in items:
+                write_state(states / items[state.case.digest()].file, state)
     return failed
-
-
-def _value(text: str) -> Any:
-    """A setting's value, as TOML reads it; a text without quotes as it is."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
 
 
 # ---- The states.
@@ -137,8 +120,7 @@ class State:
     """A specimen before and after its invasion.
 
     `grains` are as packed, `damaged` are the grains and all remaining fines at the end, those
-    upstream too, m. The ending has the numbers of fines `supplied` and `passed`, `stop_reason`,
-    computing times (`seconds`, `pack_seconds`), `steps`, their length `dt_s`, and `max_overlap`.
+    upstream too, m. The ending has numbers of the run by the names of results.csv.
     """
 
     case: InvasionCase
@@ -152,13 +134,10 @@ def state_of_run(folder: Path) -> State:
     run = fdnet.open_run(folder)
     summary, invasion = run.summary, run.manifest["invade"]
     names = ("stop_reason", "seconds", "steps", "dt_s", "max_overlap", "supplied")
-    return State(
-        case=with_fines(run.case),
-        grains=run.spheres("initial"),
-        damaged=run.spheres("damaged"),
-        ending={name: invasion[name] for name in names}
-        | {"passed": summary["passed_count"], "pack_seconds": run.manifest["pack"]["seconds"]},
-    )
+    ending = {name: invasion[name] for name in names} | {"passed": summary["passed_count"]}
+    ending["pack_seconds"] = run.manifest["pack"]["seconds"]
+    spheres = {"grains": run.spheres("initial"), "damaged": run.spheres("damaged")}
+    return State(case=with_fines(run.case), ending=ending, **spheres)
 
 
 def write_state(path: Path, state: State) -> None:
@@ -170,24 +149,17 @@ def write_state(path: Path, state: State) -> None:
         arrays[f"{name}_place"] = place.astype(np.float32)
         arrays[f"{name}_kind"] = spheres.kind.astype(np.uint8)
         arrays[f"{name}_id"] = spheres.id.astype(np.uint32)
-    buffer = BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_bytes(path, buffer.getvalue())
+    with replacing(path) as part:
+        np.savez_compressed(part, allow_pickle=False, **arrays)
 
 
 def read_state(path: Path) -> State:
-    """A state that `write_state` kept. Raises CaseError when the file is none."""
-    try:
-        with np.load(path) as file:
-            arrays = dict(file)
-        text = json.loads(arrays["text"].tobytes())
-        case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
-        grains, damaged = (_spheres(arrays, name, case) for name in ("grains", "damaged"))
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise CaseError(
-            f"{path}: is no kept state ({error}); remove it and run the study anew"
-        ) from error
+    """A state that `write_state` kept."""
+    with np.load(path) as file:
+        arrays = dict(file)
+    text = json.loads(arrays["text"].tobytes())
+    case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
+    grains, damaged = (_spheres(arrays, name, case) for name in ("grains", "damaged"))
     return State(case=case, grains=grains, damaged=damaged, ending=text["ending"])
 
 
@@ -198,16 +170,13 @@ def find_state(states: Path, item: Planned) -> State | None:
     """
     case = item.load()
     twin = replace(item, name=item.name.replace(TABLE3, "specimen7"))
-    for path in (states / item.file, states / twin.file):
-        if path.exists():
-            state = read_state(path)
-            if state.case.digest("invade") == case.digest("invade"):
-                return replace(state, case=case)
-            if path.name == item.file:
-                raise CaseError(
-                    f"{path}: is the state of another case than {item.id}; remove it to run the "
-                    "case anew"
-                )
+    for path in filter(Path.exists, (states / item.file, states / twin.file)):
+        state = read_state(path)
+        if state.case.digest("invade") == case.digest("invade"):
+            return replace(state, case=case)
+        if path.name == item.file:
+            what = f"is the state of another case than {item.id}"
+            raise CaseError(f"{path}: {what}; remove it to run the case anew")
     return None
 
 
