@@ -225,7 +225,7 @@ def test_the_citation_has_the_version_of_the_package():
 
 
 def explained(heading: str, *, block: int = 0) -> list[str]:
-    """Names that head the rows of a table, or the items of a list, of the pages on a run folder."""
+    """Names that head the rows of a table or list of the pages on a run folder."""
     text = "\n## ".join(page.read_text() for page in RUN_PAGES)
     section = text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
     rows = re.findall(r"^[|-] .*?(?=\n\n|\Z)", section, re.M | re.S)[block]
