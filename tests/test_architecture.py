@@ -145,14 +145,6 @@ def test_each_library_has_its_door(root):
                 ), f"fdnet/{module}.py imports {library}"
 
 
-def test_the_network_half_never_imports_the_dem_half(root):
-    for module, tree in modules(root).items():
-        if module.startswith("network/"):
-            assert not any(
-                name.startswith(("fdnet.dem", "fdnet.report")) for name in imported(tree)
-            ), module
-
-
 FIELD_UNITS = ("_GPa", "_mm", "_cP", "_MPa", "_ms", "_mD")
 
 

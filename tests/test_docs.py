@@ -223,13 +223,12 @@ def test_the_citation_has_the_version_of_the_package():
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
 
 
-def explained(heading: str, *, table: int = 0) -> list[str]:
-    """First cells of a table of the pages on the run folder, counted from its heading."""
+def explained(heading: str, *, block: int = 0) -> list[str]:
+    """Names that head the rows of a table or list of the pages on a run folder."""
     text = "\n## ".join(page.read_text() for page in RUN_PAGES)
     section = text.split(f"\n## {heading}\n")[1].split("\n## ")[0]
-    block = re.findall(r"^\|.*?(?=\n\n|\Z)", section, re.M | re.S)[table]
-    cells = [row.split(" | ")[0] for row in block.splitlines()[2:]]
-    return [name for cell in cells if "(" not in cell for name in re.findall(r"`(.*?)`", cell)]
+    rows = re.findall(r"^[|-] .*?(?=\n\n|\Z)", section, re.M | re.S)[block]
+    return re.findall(r"`(.*?)`", " ".join(re.findall(r"^[|-] (`[^|:]*)", rows, re.M)))
 
 
 @pytest.mark.liggghts
@@ -259,4 +258,4 @@ def test_everything_in_a_run_folder_is_explained(finished):
     network, spheres = (pv.read(run / f"{name}.vtp") for name in ("network", "spheres_damaged"))
     stored = {*network.point_data.keys(), *network.cell_data.keys()}
     assert stored == set(explained("ParaView files"))
-    assert set(spheres.point_data.keys()) == set(explained("ParaView files", table=1))
+    assert set(spheres.point_data.keys()) == set(explained("ParaView files", block=1))

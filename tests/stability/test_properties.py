@@ -13,8 +13,7 @@ from builders import TINY
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from fdnet.case.case import Case
-from fdnet.case.file import case_from, known_keys, set_keys
+from fdnet.case.file import case_from, set_keys
 from fdnet.case.tables import AnalysisChoices
 from fdnet.errors import CaseError, DumpError, FdnetError
 from fdnet.network.flow.flow import solve_flow
@@ -30,15 +29,6 @@ FIXED = settings(
 )
 SEEDS = st.integers(0, 2**31)
 LENGTHS = st.floats(0.01, 20.0)
-ODD: st.SearchStrategy[Any] = st.one_of(
-    st.none(),
-    st.booleans(),
-    st.integers(),
-    st.floats(),
-    st.text(max_size=5),
-    st.lists(st.floats(), max_size=4),
-    st.dictionaries(st.text(max_size=3), st.integers(), max_size=2),
-)
 
 
 @st.composite
@@ -62,37 +52,30 @@ def plausible(draw: st.DrawFn) -> dict[str, Any]:
     return data
 
 
-@given(plausible(), st.lists(st.tuples(st.sampled_from(sorted(known_keys())), ODD), max_size=3))
-@settings(FIXED, max_examples=200)
-def test_tables_make_a_case_or_a_case_error(data, changes):
-    for key, value in changes:
-        *names, last = key.split(".")
-        table = data
-        for name in names:
-            table = table.setdefault(name, {}) if isinstance(table, dict) else {}
-        if isinstance(table, dict):
-            table[last] = value
+@given(plausible())
+@settings(FIXED, max_examples=150)
+def test_a_case_comes_back_from_its_toml_and_its_scales_are_finite_or_refused(data):
+    """Steps, times and lengths above 0; the step below the contact and relaxation bounds."""
     try:
         case = case_from(data)
     except CaseError as error:
         said = str(error)
         assert "\n" not in said
-        assert "problem" in said
-    else:
-        assert isinstance(case, Case)
-
-
-@given(plausible())
-@settings(FIXED, max_examples=100)
-def test_a_case_comes_back_from_its_own_toml(data):
-    try:
-        case = case_from(data)
-    except CaseError:
         assume(False)
     again = case_from(tomllib.loads(case.toml()))
     assert again == case
-    assert again.digest() == case.digest()
-    assert again.toml() == case.toml()
+    assert (again.digest(), again.toml()) == (case.digest(), case.toml())
+    try:
+        scales = scales_of(case)
+    except FdnetError:
+        return
+    for field in dataclasses.fields(scales):
+        value = getattr(scales, field.name)
+        assert not isinstance(value, float) or math.isfinite(value), field.name
+    limits = [one.step_limit for name, one in scales.contacts.items() if "fine" in name]
+    assert 0 < scales.time_step <= 0.2 * min(limits)
+    assert scales.slab_length > 0
+    assert scales.supplied_count >= 1
 
 
 @given(st.text(max_size=30))
@@ -105,28 +88,6 @@ def test_any_assignment_is_taken_or_refused(text):
         assert said
     else:
         tomli_w.dumps(case.data())
-
-
-@given(plausible())
-@settings(FIXED, max_examples=150)
-def test_scales_are_finite_and_positive_or_refused(data):
-    """Steps, times and lengths above 0; the step below the contact and relaxation bounds."""
-    try:
-        case = case_from(data)
-        scales = scales_of(case)
-    except FdnetError:
-        return
-    for field in dataclasses.fields(scales):
-        value = getattr(scales, field.name)
-        if isinstance(value, float):
-            assert math.isfinite(value), field.name
-    assert (
-        0
-        < scales.time_step
-        <= 0.2 * min(c.step_limit for name, c in scales.contacts.items() if "fine" in name)
-    )
-    assert scales.slab_length > 0
-    assert scales.supplied_count >= 1
 
 
 def analysed(
@@ -242,13 +203,3 @@ def test_a_dump_cut_anywhere_is_refused_or_ends_between_two_frames(written, shar
     assert all(
         np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=False)
     )
-
-
-@given(st.binary(max_size=300))
-@settings(FIXED, max_examples=150)
-def test_any_bytes_are_frames_or_a_dump_error(data):
-    try:
-        assert isinstance(list(parse_dump(data, "d")), list)
-    except DumpError as error:
-        said = str(error)
-        assert "\n" not in said
