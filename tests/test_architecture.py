@@ -64,6 +64,8 @@ DOORS = {
         "network/permeability",
         "report/tables",
         "campaign/result",
+        "formation/scale_up",
+        "commands/formation",
     },
     "pyvista": {"report/vtk", "report/picture"},
     "vtkmodules": {"report/vtk", "spheres/vtk_file"},

@@ -12,7 +12,7 @@ volume, those that passed by the share that gets through the length.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,8 +23,9 @@ from scipy.optimize import minimize, minimize_scalar
 from fdnet.case.case import InvasionCase
 from fdnet.errors import CaseError
 from fdnet.files import expanded
-from fdnet.formation.model import CakeOf, FineClass, Release, Rock
+from fdnet.formation.model import FineClass, Medium
 from fdnet.report.figures import BLUE, DEPTH_LABEL, GREY, MM, draw, stairs
+from fdnet.run.by_classes import FIRST_DRAWN, Rested, rested_classes
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import MANIFEST, is_run_folder
 from fdnet.spheres.snapshot import Array
@@ -42,11 +43,20 @@ class DepthFit(NamedTuple):
     covariance: Array
     misfit: float
 
+    def drawn(self, normal: Array) -> Array:
+        """ln(rate m) and g for a draw (2,) of the normal distribution."""
+        return self.values + np.linalg.cholesky(self.covariance) @ normal
 
-def fit_depths(depth: Array, volume: Array, passed: float, length: float) -> DepthFit:
-    """The filtration of fines at depths (N,) m with volumes (N,) m3; `passed` m3 got through."""
+
+def fit_depths(fines: Rested, length: float) -> DepthFit:
+    """The filtration of fines in a specimen of `length` m; constant where they are too few."""
+    depth, volume, passed = fines.depth, fines.volume, fines.passed
     whole = float(volume.sum())
-    weight = np.append(volume, passed) * whole / np.sum(volume**2)
+    far = max(float(depth @ volume + passed * length) / max(whole, 1e-300), 1e-6 * length)
+    if fines.number < FEWEST:
+        error = 1 / max(fines.number, 1.0)
+        return DepthFit(np.array([-math.log(far), 1e-6]), np.diag([error, 1e-30]), 0.0)
+    weight = np.append(volume, passed) * fines.number / whole
 
     def logs(values: Array) -> Array:
         rate, g = math.exp(values[0]), values[1] if abs(values[1]) > 1e-6 else 1e-6
@@ -56,7 +66,7 @@ def fit_depths(depth: Array, volume: Array, passed: float, length: float) -> Dep
 
     best = minimize(
         lambda values: -float(weight @ logs(values)),
-        [-math.log(float(depth @ volume + passed * length) / whole), 0.5],
+        [-math.log(far), 0.5],
         bounds=_BOUNDS,
         method="Nelder-Mead",
     ).x
@@ -80,167 +90,106 @@ def fit_damage(kept: Array, deposit: Array, share: Array) -> tuple[float, float]
 
     best = float(minimize_scalar(lambda v: np.sum(apart(v) ** 2), bounds=(-4, 12)).x)
     slope = (apart(best + 1e-4) - apart(best - 1e-4)) / 2e-4
-    free = max(len(kept) - 1, 1)
-    spread = float(np.sum(apart(best) ** 2)) / free
+    spread = float(np.sum(apart(best) ** 2)) / max(len(kept) - 1, 1)
     return best, math.sqrt(spread / float(np.sum(slope**2)))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class HandedUp:
-    """What a specimen hands up, in the parts of `fdnet.formation.model.march`, and its evidence.
+class HandedUp(NamedTuple):
+    """What a specimen hands up, and the evidence for it.
 
     Attributes:
         run: that it comes from.
-        rock, mud, cake, release: the model's; None where the specimen cannot tell.
-        closing: deposit at which the face closes, or that it had when the run ended.
-        bins, deposit: (B+1,) m and (B,), the measured profile.
+        medium: rock and mud of `fdnet.formation.model.march`.
         fitted: (F,) deposit at F even depths of the specimen, by the fit.
-        sections, kept: (S, 2) m and (S,), k / k0 of the sections in place.
         notes: what could not be told, and what was assumed.
     """
 
     run: FinishedRun
-    rock: Rock
-    mud: tuple[FineClass, ...]
-    cake: CakeOf | None
-    release: Release | None
-    closing: float
-    bins: Array
-    deposit: Array
+    medium: Medium
     fitted: Array
-    sections: Array
-    kept: Array
     notes: tuple[str, ...]
 
-    @property
-    def places(self) -> Array:
-        """(F,) m, depths of `fitted`."""
-        return (np.arange(len(self.fitted)) + 0.5) * (self.bins[-1] / len(self.fitted))
-
-    def values(self) -> dict[str, float]:
+    def values(self) -> dict[str, float | None]:
         """The fitted numbers by name, SI; of several classes each with the name of its class."""
-        found: dict[str, float] = {}
-        for one in self.mud:
-            end = f"_{one.name}" if len(self.mud) > 1 else ""
+        found, medium = dict[str, float | None](), self.medium
+        for one in medium.mud:
+            end = f"_{one.name}" if len(medium.mud) > 1 else ""
             found |= {f"rate_1_m{end}": one.rate, f"growth{end}": one.growth}
-        found |= {"closing_deposit": self.closing, "damage": self.rock.damage}
-        cake = self.cake
-        return found | ({"cake_permeability_m2": cake.permeability} if cake else {})
+        found |= {"closing_deposit": medium.closing, "damage": medium.damage}
+        return found | {"cake_permeability_m2": medium.cake_permeability}
 
 
-def hand_up(source: str | Path | FinishedRun, *, classes: int = 1) -> list[HandedUp]:
+def places_of(run: FinishedRun) -> Array:
+    """(F,) m, depths of `HandedUp.fitted`."""
+    return (np.arange(PLACES) + 0.5) * (run.case.size_m[0] / PLACES)
+
+
+def kept_by(run: FinishedRun) -> Array:
+    """(S,) k / k0 of the sections of a run, in place."""
+    after, before = (run.sections[f"k_{one}_inplace_m2"] for one in ("damaged", "initial"))
+    return (after / before).to_numpy()
+
+
+def hand_up(source: str | Path | FinishedRun) -> list[HandedUp]:
     """What a run hands up, in SI units; behind it `DRAWS` draws within its errors, or other seeds.
+
+    The fines of LIGGGHTS are one class, and each class of the network is one of its own.
 
     Args:
         source: a run, its folder, or the folder of an ensemble.
-        classes: classes of size, of equal volume, that the fines are taken in.
 
     Raises:
         CaseError: the specimen cannot tell the filtration or the damage; the message says why.
 
     Examples:
         >>> import fdnet
-        >>> fdnet.hand_up("runs/quick")[0].mud[0].rate > 0
+        >>> fdnet.hand_up("runs/quick")[0].medium.mud[0].rate > 0
         True
     """
     if isinstance(source, FinishedRun):
-        return _of_run(source, classes)
+        return _of_run(source)
     folder = expanded(source)
     if is_run_folder(folder) or not folder.is_dir():
-        return _of_run(open_run(folder), classes)
-    done = [one.parent for one in sorted((folder / "runs").glob(f"*/{MANIFEST}"))]
-    if not done:
+        return _of_run(open_run(folder))
+    runs = [open_run(one.parent) for one in sorted((folder / "runs").glob(f"*/{MANIFEST}"))]
+    if not runs:
         raise CaseError(f"{folder}: holds no finished run; give a run folder or an ensemble")
-    runs = [open_run(one) for one in done]
     cases = [{**one.case.data(), "seed": 0} for one in runs]
     if any(case != cases[0] for case in cases):
         raise CaseError(
             f"{folder}: its runs differ by more than the seed; give one of them, or an ensemble"
         )
-    return [_of_run(run, classes)[0] for run in runs]
+    return [_of_run(run)[0] for run in runs]
 
 
-def _of_run(run: FinishedRun, classes: int) -> list[HandedUp]:
+def _rested(run: FinishedRun, case: InvasionCase) -> list[Rested]:
+    """The spheres as one kind, then each class of the network."""
+    classes = rested_classes(run, case) if case.by_classes or case.with_classes else []
+    if case.by_classes:
+        return classes
+    fines = run.spheres().fines()
+    fines = fines.where(fines.id < FIRST_DRAWN)
+    depth, volume = fines.position[:, 0], 4 / 3 * np.pi * fines.radius**3
+    inside = (depth >= 0) & (depth < case.size_m[0])
+    last = run.history if case.with_classes else run.summary
+    spheres = Rested(
+        name=f"{2e6 * fines.radius.mean():.3g} µm",
+        concentration=case.fines.volume_fraction - sum(one.concentration for one in classes),
+        depth=depth[inside],
+        volume=volume[inside],
+        passed=float(np.max(last["passed_count"])) * float(volume.mean()),
+        number=float(volume[inside].sum() ** 2 / max(np.sum(volume[inside] ** 2), 1e-300)),
+    )
+    return [spheres, *classes]
+
+
+def _of_run(run: FinishedRun) -> list[HandedUp]:
     case, summary, start = run.case, run.summary, f"{run.path}: "
     if not isinstance(case, InvasionCase) or not summary["supplied_count"]:
         raise CaseError(f"{start}no fines were supplied, so nothing is filtered")
-    fines, length, area = run.spheres().fines(), case.size_m[0], math.prod(case.size_m[1:])
-    depth, volume = fines.position[:, 0], 4 / 3 * np.pi * fines.radius**3
-    inside, passed = (depth >= 0) & (depth < length), summary["passed_count"]
-    found, shut, notes = int(inside.sum()), summary["stop_reason"] == "plugged", list[str]()
-    _refuse(start, found, passed, length, shut, classes)
-    size = np.cumsum(np.sort(volume))[np.argsort(np.argsort(fines.radius, kind="stable"))]
-    own = np.ceil(size / volume.sum() * classes * (1 - 1e-12)).astype(int)
-    here = [inside & (own == one + 1) for one in range(classes)]
-    if min(which.sum() for which in here) < FEWEST <= found:
-        raise CaseError(f"{start}a class has fewer than {FEWEST} fines inside; take fewer classes")
-    through, solids = passed * float(volume.mean()), case.fines.volume_fraction
-    names = [f"{2e6 * fines.radius[own == one + 1].mean():.3g} µm" for one in range(classes)]
-    parts = [float(volume[own == one + 1].sum() / volume.sum()) * solids for one in range(classes)]
-
-    bins = np.append(run.profile["x_lo_m"], run.profile["x_hi_m"].iloc[-1])
-    slabs = run.sections[["x_lo_m", "x_hi_m"]].to_numpy()
-    before, after = (run.sections[f"k_{s}_inplace_m2"] for s in ("initial", "damaged"))
-    kept = (after / before).to_numpy()
-    cake, release = _cake(summary, notes), _release(run, length, notes)
-    rock = Rock(porosity=run.porosity_initial, permeability=run.k_initial_m2, damage=0.0)
-    made = HandedUp(
-        run=run,
-        rock=rock,
-        mud=tuple(FineClass(*one, 0.0) for one in zip(names, parts, strict=True)),
-        cake=cake,
-        release=release,
-        closing=0.0,
-        bins=bins,
-        deposit=np.histogram(depth, bins, weights=volume)[0] / np.diff(bins) / area,
-        fitted=np.zeros(PLACES),
-        sections=slabs,
-        kept=kept,
-        notes=(),
-    )
-    if found < FEWEST:
-        notes.append(f"only {found} fines entered before the face closed: all is cake")
-        return [replace(made, notes=tuple(notes))]
-    if not shut:
-        made = replace(made, cake=None)
-        notes.append(
-            f"the run ended by {summary['stop_reason']} and not by a closed face: what follows "
-            "when the face has this deposit is not known"
-        )
-    fits = [fit_depths(depth[one], volume[one], through, length) for one in here]
-    if (worst := max(fit.misfit for fit in fits)) > MISFIT:
-        notes.append(f"the fitted depths differ from the measured by {worst:.0%} of the fines")
-    amounts = np.array([(volume[one].sum() + through) / area for one in here])
-    random, many = np.random.default_rng(0), list[HandedUp]()
-    for number in range(DRAWS + 1):
-        normal = random.standard_normal((classes, 3)) * (number > 0)
-        drawn = [
-            fit.values + np.linalg.cholesky(fit.covariance) @ z[:2]
-            for fit, z in zip(fits, normal, strict=True)
-        ]
-        rate, g = np.array([[math.exp(one[0]), one[1]] for one in drawn]).T
-        amount = amounts * (1 + normal[:, 2] / math.sqrt(found / classes))
-        face = float(np.sum(amount * rate * np.expm1(g) / g))
-        w = -np.expm1(-g) * np.exp(-np.outer(made.places, rate))
-        fitted = np.sum(amount * rate * w / (1 - w) / g, axis=1)
-        damage, error = _damage(start, replace(made, fitted=fitted))
-        harm = math.exp(damage + error * random.standard_normal() * (number > 0))
-        mud = zip(names, parts, rate.tolist(), (np.expm1(g) / face).tolist(), strict=True)
-        many.append(
-            replace(
-                made,
-                rock=replace(rock, damage=harm),
-                mud=tuple(FineClass(*one) for one in mud),
-                closing=face,
-                fitted=fitted,
-                notes=tuple(notes),
-            )
-        )
-    return many
-
-
-def _refuse(start: str, found: int, passed: int, length: float, shut: bool, classes: int) -> None:
-    """Raises CaseError where the depths of the fines cannot tell the filtration."""
+    length, area = case.size_m[0], math.prod(case.size_m[1:])
+    kinds, shut, notes = _rested(run, case), summary["stop_reason"] == "plugged", list[str]()
+    found, passed = round(sum(one.number for one in kinds)), summary["passed_count"]
     if found == 0 and passed:
         raise CaseError(
             f"{start}all {passed} fines passed {1e3 * length:g} mm, none was filtered: the rate "
@@ -251,50 +200,96 @@ def _refuse(start: str, found: int, passed: int, length: float, shut: bool, clas
             f"{start}{found} fines inside, {FEWEST} are needed to fit a rate of filtration, or a "
             "face that closes; supply more mud"
         )
-    if classes < 1 or (classes > 1 and passed):
-        raise CaseError(
-            f"classes: {classes}, expected 1 or more, and 1 where fines passed: their sizes "
-            f"({passed} fines) are in no table"
+    medium = Medium(
+        porosity=run.porosity_initial,
+        permeability=run.k_initial_m2,
+        viscosity=case.fluid.viscosity_Pa_s,
+        mud=tuple(FineClass(one.name, one.concentration, 0.0) for one in kinds),
+        closing=0.0,
+        **_cake(summary, notes),
+        **_release(run, length, notes),
+    )
+    if found < FEWEST:
+        notes.append(f"only {found} fines entered before the face closed: all is cake")
+        return [HandedUp(run, medium, np.zeros(PLACES), tuple(notes))]
+    if not shut:
+        medium = replace(medium, cake_permeability=None)
+        notes.append(
+            f"the run ended by {summary['stop_reason']} and not by a closed face: what follows "
+            "when the face has this deposit is not known"
         )
+    fits = [fit_depths(one, length) for one in kinds]
+    if (worst := max(fit.misfit for fit in fits)) > MISFIT:
+        notes.append(f"the fitted depths differ from the measured by {worst:.0%} of the fines")
+    if few := [one.name for one in kinds if one.number < FEWEST]:
+        notes.append(
+            f"too little of the fines of {', '.join(few)} rests inside for more than one number: "
+            "their filtration is taken as constant"
+        )
+    amounts = np.array([(one.volume.sum() + one.passed) / area for one in kinds])
+    spread = np.array([max(one.number, 1.0) for one in kinds]) ** -0.5
+    random, many = np.random.default_rng(0), list[HandedUp]()
+    for number in range(DRAWS + 1):
+        normal = random.standard_normal((len(kinds), 3)) * (number > 0)
+        drawn = [fit.drawn(z) for fit, z in zip(fits, normal[:, :2], strict=True)]
+        rate, g = np.exp([one[0] for one in drawn]), np.array([one[1] for one in drawn])
+        amount = amounts * (1 + normal[:, 2] * spread)
+        face = float(np.sum(amount * rate * np.expm1(g) / g))
+        w = -np.expm1(-g) * np.exp(-np.outer(places_of(run), rate))
+        fitted = np.sum(amount * rate * w / (1 - w) / g, axis=1)
+        harm, error = _damage(start, run, fitted)
+        mud = [
+            one._replace(rate=float(of_it), growth=float(more))
+            for one, of_it, more in zip(medium.mud, rate, np.expm1(g) / face, strict=True)
+        ]
+        own = replace(
+            medium,
+            damage=math.exp(harm + error * random.standard_normal() * (number > 0)),
+            mud=tuple(mud),
+            closing=face,
+        )
+        many.append(HandedUp(run, own, fitted, tuple(notes)))
+    return many
 
 
-def _damage(start: str, made: HandedUp) -> tuple[float, float]:
+def _damage(start: str, run: FinishedRun, fitted: Array) -> tuple[float, float]:
     """`fit_damage` of the fitted deposit over the sections that have an open path."""
-    kept, x = made.kept, made.places
-    open_ = (kept > 0) & np.isfinite(kept)
-    if not open_.any() or kept[open_].min() > 1 - LEAST_LOSS:
+    kept, x = kept_by(run), places_of(run)
+    paths = (kept > 0) & np.isfinite(kept)
+    if not paths.any() or kept[paths].min() > 1 - LEAST_LOSS:
         raise CaseError(
             f"{start}no open section lost {LEAST_LOSS:.0%} of its permeability, so the harm of a "
             "deposit cannot be told; supply more mud"
         )
-    share = (x >= made.sections[open_, :1]) & (x < made.sections[open_, 1:])
-    return fit_damage(kept[open_], made.fitted, share / share.sum(axis=1, keepdims=True))
+    low, high = run.sections[paths][["x_lo_m", "x_hi_m"]].to_numpy().T[..., None]
+    share = (x >= low) & (x < high)
+    return fit_damage(kept[paths], fitted, share / share.sum(axis=1, keepdims=True))
 
 
-def _cake(summary: Mapping[str, Any], notes: list[str]) -> CakeOf | None:
+def _cake(summary: Mapping[str, Any], notes: list[str]) -> dict[str, Any]:
     """The cake of the packed slices, also where they are thinner than a cake should be."""
     cake = summary.get("cake") or {}
     if not cake.get("packed_thickness_m"):
         notes.append("no packed cake stands before the face: its permeability is not known")
-        return None
+        return {}
     k = cake["k_m2"]
     if k is None:
         notes.append(f"{cake['no_cake_yet']}; its permeability is taken as if it were one")
         k = cake["packed_thickness_m"] / cake["resistance_1_m"]
-    return CakeOf(porosity=cake["porosity"], permeability=k)
+    return {"cake_porosity": cake["porosity"], "cake_permeability": k}
 
 
-def _release(run: FinishedRun, length: float, notes: list[str]) -> Release | None:
+def _release(run: FinishedRun, length: float, notes: list[str]) -> dict[str, Any]:
     """The share that the clean-up of the run took away; its pace is assumed."""
     cleaned = run.summary.get("clean_up")
     if not cleaned or not cleaned["inside_before"]:
-        return None
+        return {}
     share = cleaned["came_out"] / cleaned["inside_before"]
     notes.append(
         f"back-flow takes {share:.0%} of the deposit, as the clean-up of the run did; that it "
         "falls to 1/e with each pore volume of the specimen is assumed"
     )
-    return Release(share=share, rate=1 / (run.porosity_initial * length))
+    return {"released": share, "release_rate": 1 / (run.porosity_initial * length)}
 
 
 # ------------------------------------------------------------------------------------------------
@@ -308,14 +303,18 @@ def draw_fit(handed: Sequence[HandedUp], path: Path) -> Path:
 
 def _fill(figure: Any, *, handed: Sequence[HandedUp]) -> None:
     above, below = figure.subplots(2, 1, sharex=True)
+    line = {"color": BLUE, "linewidth": 1.0, "alpha": 0.5}
     for number, one in enumerate(handed):
-        depth, deposit = one.places, one.fitted
-        if number == 0 or one.run is not handed[0].run:
-            stairs(above, one.bins, np.where(one.deposit > 0, one.deposit, np.nan), color=GREY)
-            stairs(below, np.append(one.sections[:, 0], one.sections[-1, 1]), one.kept, color=GREY)
-        above.plot(depth * MM, deposit, color=BLUE, linewidth=1.0, alpha=0.5)
-        below.plot(
-            depth * MM, 1 / one.rock.loss(deposit[None]), color=BLUE, linewidth=1, alpha=0.5
-        )
+        run, x = one.run, places_of(one.run) * MM
+        if number == 0 or run is not handed[0].run:
+            taken = run.profile["porosity_initial"] - run.profile["porosity_damaged"]
+            stairs(above, _edges(run.profile), taken.where(taken > 0), color=GREY)
+            stairs(below, _edges(run.sections), kept_by(run), color=GREY)
+        above.plot(x, one.fitted, **line)
+        below.plot(x, 1 / one.medium.loss(one.fitted), **line)
     above.set(yscale="log", ylabel="deposit (share of volume)", ylim=(1e-4, 1))
     below.set(xlabel=DEPTH_LABEL, ylabel="k / k0", ylim=(0, 1.05))
+
+
+def _edges(table: Any) -> Array:
+    return np.append(table["x_lo_m"], table["x_hi_m"].iloc[-1])

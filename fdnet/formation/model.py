@@ -1,28 +1,21 @@
 """Fines carried into a core or around a well, in one dimension: filtration, Darcy, a cake.
 
-With the volume V that has flowed in since the start, the concentration c_i of a class (volume of
-fines over volume of fluid) and its deposit s_i (volume of fines over bulk volume), at a depth
-where the flow crosses the area A,
+The volume V that has flowed in takes the place of time (Iwasaki 1937; Herzig, Leclerc and Le Goff
+1970): at a depth where the flow crosses the area A,
 
-    phi dc_i/dV + A dc_i/dx / A = - ds_i/dV,    A ds_i/dV = rate_i (1 + growth_i s) c_i,
+    phi dc_i/dV + dc_i/dx / A = - ds_i/dV,    A ds_i/dV = rate_i (1 + growth_i s) c_i.
 
-s being the deposit of all classes (Iwasaki 1937; Herzig, Leclerc and Le Goff 1970). Time does not
-enter: it follows from Darcy's law, mu dV/dt R(V) = dp, where R is the resistance of cake, cells
-and formation in series. Of the permeability k0 the deposit leaves k0 / (1 + damage s)^power (power
-2: Mays and Hunt 2005). When the deposit at the face reaches `closing`, the solids that arrive
-build a cake instead (Pang and Sharma 1997). The volume that deposit takes from the pores is left
-out of phi. Derivations are on docs/theory/from_core_to_well.md.
+Formulas, sources and cells are derived on docs/theory/from_core_to_well.md.
 """
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_banded
-from scipy.optimize import brentq
 
 from fdnet.spheres.snapshot import Array
 
@@ -64,31 +57,9 @@ class Column:
         return np.asarray(way / self.area)
 
 
-def steep_grid(length: float, cells: int, first: float) -> Array:
-    """(J+1,) edges, m, of cells that grow by one factor from `first` m at the face."""
-    if first * cells >= length:
-        return np.linspace(0.0, length, cells + 1)
-
-    def excess(growth: float) -> float:
-        return first * math.expm1(cells * growth) / math.expm1(growth) - length
-
-    growth = brentq(excess, 1e-9, 700.0 / cells)
-    edges = np.expm1(growth * np.arange(cells + 1))
-    return edges * (length / edges[-1])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rock:
-    """Sound rock, and what a deposit s does to it: k = permeability / (1 + damage s)^power."""
-
-    porosity: float
-    permeability: float
-    damage: float
-    power: float = 2.0
-
-    def loss(self, deposit: Array) -> Array:
-        """k0 / k of deposits (C, J) of all classes; (J,)."""
-        return (1.0 + self.damage * np.sum(deposit, axis=0)) ** self.power
+def steep_grid(length: float, cells: int, scale: float) -> Array:
+    """(J+1,) edges, m, of cells that grow by one factor, slowly within `scale` m of the face."""
+    return np.geomspace(scale, scale + length, cells + 1) - scale
 
 
 class FineClass(NamedTuple):
@@ -108,12 +79,43 @@ class FineClass(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CakeOf:
-    """What a cake is: porosity, permeability (m2), and its shape as `cake_skin` names it."""
+class Medium:
+    """A rock and a mud as the model knows them, SI units.
+
+    Attributes:
+        porosity, permeability: of sound rock.
+        damage, power: a deposit s leaves permeability / (1 + damage s)^power.
+        viscosity: Pa s.
+        mud: its classes.
+        closing: deposit of the face at which it closes; 0: at once, infinite: never.
+        cake_porosity, cake_permeability: of what the solids build on the closed face; without a
+            permeability nothing is known from then on.
+        cake_shape: as `cake_skin` names it.
+        released: share of the deposit that back-flow can take away.
+        release_rate: 1/m, how fast it decays with the back-flow over the area.
+    """
 
     porosity: float
     permeability: float
-    shape: str = "linear"
+    damage: float = 0.0
+    power: float = 2.0
+    viscosity: float = 1e-3
+    mud: tuple[FineClass, ...] = ()
+    closing: float = math.inf
+    cake_porosity: float = 0.5
+    cake_permeability: float | None = None
+    cake_shape: str = "linear"
+    released: float = 0.0
+    release_rate: float = 0.0
+
+    @property
+    def solids(self) -> float:
+        """Volume of all fines over that of the mud."""
+        return sum(one.concentration for one in self.mud)
+
+    def loss(self, deposit: Array) -> Array:
+        """k0 / k of a deposit (J,) of all classes."""
+        return (1.0 + self.damage * deposit) ** self.power
 
 
 class Flood(NamedTuple):
@@ -126,16 +128,6 @@ class Flood(NamedTuple):
     def flow(self, resistance: float) -> float:
         """m3/s through a resistance in Pa s/m3."""
         return self.pressure / resistance if self.rate is None else self.rate
-
-
-class Release(NamedTuple):
-    """Deposit that back-flow takes away: a `share` of it, decaying by `rate` 1/m of its flow."""
-
-    share: float
-    rate: float
-
-
-NO_RELEASE = Release(0.0, 0.0)
 
 
 def cake_skin(shape: str, thickness: float, well: float) -> float:
@@ -161,8 +153,7 @@ def damage_skin(column: Column, loss: Array) -> float:
     return float(np.sum((loss - 1.0) * over_r))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Filled:
+class Filled(NamedTuple):
     """Where the fines of C classes are, in J cells.
 
     Attributes:
@@ -182,19 +173,13 @@ class Filled:
     passed: Array
     returned: Array
 
-    def kept(self, column: Column, rock: Rock) -> Array:
-        """(C,) m3 of fines inside and in the cake."""
-        inside = (rock.porosity * self.suspended + self.deposit) @ column.volume
-        return np.asarray(inside + self.cake)
 
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class March:
+class March(NamedTuple):
     """What `march` gives, at N moments, in S sections, for C classes.
 
     Attributes:
         time, filtrate: (N,) s and m3 (what flowed in less what flowed back).
-        rate, pressure: (N,) m3/s and Pa, of the whole way.
+        rate: (N,) m3/s.
         parts: (N, S+2) Pa, lost in the cake, each section, and behind the sections.
         k_over_k0: (N, S) of the sections.
         effluent: (N, C) volume of fines over volume of fluid that leaves.
@@ -207,7 +192,6 @@ class March:
     time: Array
     filtrate: Array
     rate: Array
-    pressure: Array
     parts: Array
     k_over_k0: Array
     effluent: Array
@@ -218,203 +202,149 @@ class March:
 
 def march(
     column: Column,
-    rock: Rock,
-    mud: Sequence[FineClass],
+    medium: Medium,
     drives: Sequence[Flood],
-    viscosity: float,
     *,
-    cake: CakeOf | None = None,
-    closing: float = math.inf,
-    release: Release = NO_RELEASE,
     taps: Array | None = None,
     fineness: float = FINENESS,
 ) -> March:
-    """The mud of the classes driven through the column, from clean rock on.
+    """The mud driven through the column by one of the `drives` after the other, from clean rock.
 
-    Args:
-        column: the way of the flow.
-        rock: porosity, permeability and damage.
-        mud: its classes.
-        drives: one after the other; a back-flow lifts the cake first.
-        viscosity: Pa s.
-        cake: what the solids build on the closed face; None: the march ends when it closes.
-        closing: deposit of the face at which it closes; 0: at once, infinite: never.
-        release: what back-flow takes away.
-        taps: (S+1,) m, depths between which sections are measured; by default the ends.
-        fineness: largest relative step; the error falls with it to first order.
+    A back-flow lifts the cake first. `taps` (S+1,) m are the depths between which sections are
+    measured, by default the ends. `fineness` is the largest relative step; the error falls with
+    it to first order.
     """
-    cells, none = np.zeros((len(mud), len(column.width))), np.zeros(len(mud))
-    state = Filled(
-        **dict.fromkeys(("suspended", "deposit", "held"), cells),
-        **dict.fromkeys(("cake", "supplied", "passed", "returned"), none),
-        face=0.0,
-    )
-    taps = column.edges[[0, -1]] if taps is None else np.asarray(taps, float)
-    resistances = partial(_resistances, column=column, rock=rock, cake=cake, taps=taps)
-    small = fineness / 10 * rock.porosity * float(column.volume.sum())
+    none, mu = np.zeros(len(medium.mud)), medium.viscosity
+    cells = np.zeros((len(none), len(column.width)))
+    state = Filled(cells, cells, cells, 0.0, none, none, none, none)
+    at = column.edges[[0, -1]] if taps is None else taps
+    resistances = partial(_resistances, column, medium, column.reach(at))
+    small = fineness / 10 * medium.porosity * float(column.volume.sum())
     time, filtrate, closed_at, stopped = 0.0, 0.0, None, ""
     parts, rows = resistances(state), list[tuple[Any, ...]]()
     for drive in drives:
-        end, since = time + drive.seconds, 0.0
-        back = (drive.pressure if drive.rate is None else drive.rate) < 0
+        end, since, back = time + drive.seconds, 0.0, drive.flow(1.0) < 0
         if back:
-            held = np.maximum(state.held, (1 - release.share) * state.deposit)
-            returned = state.returned + state.cake
-            state = replace(state, returned=returned, cake=none, held=held)
+            held = np.maximum(state.held, (1 - medium.released) * state.deposit)
+            state = state._replace(returned=state.returned + state.cake, cake=none, held=held)
             parts = resistances(state)
         if not rows:
-            flow = drive.flow(viscosity * parts.sum())
-            rows.append((time, filtrate, flow, viscosity * flow * parts, none))
+            rows.append((time, filtrate, drive.flow(mu * parts.sum()), parts, none))
         while time < end:
-            shut = not back and state.face >= closing
+            shut = not back and state.face >= medium.closing
             if shut:
                 closed_at = time if closed_at is None else closed_at
-                stopped = "" if cake else "closed"
+                stopped = "closed" if medium.cake_permeability is None else stopped
             if stopped:
                 break
             step, to_closing = fineness * since + small, math.inf
             if not back and not shut:
-                most, to_closing = _until(state, column, rock, mud, closing, fineness)
+                most, to_closing = _until(state, column, medium, fineness)
                 step = min(step, most, to_closing)
             for _ in range(60):
-                if back:
-                    after, effluent = _backward(state, column, rock, release, step)
-                else:
-                    after, effluent = _forward(state, column, rock, mud, cake, shut, step)
+                after, effluent = _moved(state, column, medium, step, back, shut)
                 new = resistances(after)
                 if not np.isfinite(new).all():
+                    stopped = "full"
                     break
-                seconds = step / abs(drive.flow(viscosity * (parts + new).sum() / 2))
+                seconds = step / abs(drive.flow(mu * (parts + new).sum() / 2))
                 early = (end - time - seconds) / drive.seconds
                 if early >= -_LANDED:
                     break
                 step *= (end - time) / seconds
-            if not np.isfinite(new).all():
-                stopped = "full"
+            if stopped:
                 break
             time = end if early <= _LANDED else time + seconds
             filtrate, since = filtrate + (-step if back else step), since + step
             if step == to_closing:
-                after, since = replace(after, face=closing), 0.0
+                after, since = after._replace(face=medium.closing), 0.0
             state, parts = after, new
-            flow = drive.flow(viscosity * parts.sum())
-            rows.append((time, filtrate, flow, viscosity * flow * parts, effluent))
-    times, volumes, rates, drops, effluents = (np.array(one) for one in zip(*rows, strict=True))
-    clean = np.diff(column.reach(taps)) / rock.permeability
-    return March(
-        time=times,
-        filtrate=volumes,
-        rate=rates,
-        pressure=drops.sum(axis=1),
-        parts=drops,
-        k_over_k0=clean * viscosity * rates[:, None] / drops[:, 1:-1],
-        effluent=effluents,
-        end=state,
-        closed_at=closed_at,
-        stopped=stopped,
-    )
+            rows.append((time, filtrate, drive.flow(mu * parts.sum()), parts, effluent))
+    times, volumes, rates, met, effluents = (np.array(one) for one in zip(*rows, strict=True))
+    kept = np.diff(column.reach(at)) / medium.permeability / met[:, 1:-1]
+    drops = mu * rates[:, None] * met
+    return March(times, volumes, rates, drops, kept, effluents, state, closed_at, stopped)
 
 
-def _resistances(
-    state: Filled, column: Column, rock: Rock, cake: CakeOf | None, taps: Array
-) -> Array:
+def _resistances(column: Column, medium: Medium, at: Array, state: Filled) -> Array:
     """(S+2,) resistances over viscosity, 1/m3, of cake, sections and the rest of the way.
 
     That of a cake which fills the well is infinite.
     """
-    reach, at = column.reach(column.edges), column.reach(taps)
-    cells = np.append(0.0, np.cumsum(np.diff(reach) * rock.loss(state.deposit)))
+    reach, loss = column.reach(column.edges), medium.loss(state.deposit.sum(axis=0))
+    cells = np.append(0.0, np.cumsum(np.diff(reach) * loss))
     inside = np.interp(at, reach, cells)
     outer = float(column.reach(max(column.outer, column.edges[-1])) - reach[-1])
     own = 0.0
-    if cake and state.cake.any():
-        thick = state.cake.sum() / ((1 - cake.porosity) * column.area)
+    if medium.cake_permeability and state.cake.any():
+        thick = state.cake.sum() / ((1 - medium.cake_porosity) * column.area)
         own = thick / column.area
         if math.isfinite(column.well):
-            own = cake_skin(cake.shape, thick, column.well) * column.well / column.area
-        own *= rock.permeability / cake.permeability
+            own = cake_skin(medium.cake_shape, thick, column.well) * column.well / column.area
+        own *= medium.permeability / medium.cake_permeability
     ends = cells[-1] - inside[-1] + outer
-    return np.array([own, *np.diff(inside), ends]) / rock.permeability
+    return np.array([own, *np.diff(inside), ends]) / medium.permeability
 
 
-def _until(
-    state: Filled,
-    column: Column,
-    rock: Rock,
-    mud: Sequence[FineClass],
-    closing: float,
-    fineness: float,
-) -> tuple[float, float]:
+def _at_the_face(medium: Medium, face: float) -> tuple[float, float]:
+    """Area times ds/dV at the deposit `face`, and its slope with the deposit."""
+    start = sum(one.rate * (1 + one.growth * face) * one.concentration for one in medium.mud)
+    return start, sum(one.rate * one.growth * one.concentration for one in medium.mud)
+
+
+def _until(state: Filled, column: Column, medium: Medium, fineness: float) -> tuple[float, float]:
     """Volume m3 in which the face changes little, and that until it closes (infinite: never)."""
-    start = sum(one.rate * (1 + one.growth * state.face) * one.concentration for one in mud)
-    slope = sum(one.rate * one.growth * one.concentration for one in mud)
+    start, slope = _at_the_face(medium, state.face)
     limits = [2 * fineness / abs(slope)] if slope else []
-    if start > 0 and rock.damage > 0:
-        limits.append(fineness * (1 / rock.damage + state.face) / rock.power / start)
-    full = (closing - state.face) / start if start > 0 else math.inf
+    if start > 0 and medium.damage > 0:
+        limits.append(fineness * (1 / medium.damage + state.face) / medium.power / start)
+    full = (medium.closing - state.face) / start if start > 0 else math.inf
     if slope:
         full = math.log1p(full * slope) / slope if full * slope > -1 else math.inf
     return column.area * min(limits, default=math.inf), column.area * full
 
 
-def _forward(
-    state: Filled,
-    column: Column,
-    rock: Rock,
-    mud: Sequence[FineClass],
-    cake: CakeOf | None,
-    shut: bool,
-    volume: float,
+def _moved(
+    state: Filled, column: Column, medium: Medium, volume: float, back: bool, shut: bool
 ) -> tuple[Filled, Array]:
-    """The state after a `volume` m3 of inflow, and the mean effluent (C,).
+    """The state after a `volume` m3 of flow, and the mean (C,) that leaves.
 
     The filtration coefficients are those of the deposit half-way. Through a shut face no fines
     enter; the mud whose place the cake takes brings its own solids.
     """
-    _, solids, rate, growth = (np.array(one) for one in zip(*mud, strict=True))
-    if shut and cake:
-        free = 1 - cake.porosity
+    _, solids, rate, growth = (np.array(one) for one in zip(*medium.mud, strict=True))
+    pores, inflow = medium.porosity * column.volume, np.zeros_like(state.deposit)
+    if back:
+        pace = medium.release_rate * volume
+        freed = (state.deposit - state.held) * -np.expm1(-pace * column.width / column.volume)
+        source = (freed * column.volume / volume)[:, ::-1]
+        out, last = _sweep(source, state.suspended[:, ::-1], pores[::-1], inflow, volume)
+        after = state._replace(
+            suspended=last[:, ::-1],
+            deposit=state.deposit - freed,
+            face=state.face * (1 + medium.released * math.expm1(-pace / column.area)),
+            returned=state.returned + out[:, -1] * volume,
+        )
+        return after, out[:, -1]
+    start, slope = (one * volume / column.area for one in _at_the_face(medium, state.face))
+    if shut:
+        free = 1 - medium.cake_porosity
         built = free * solids / (free - solids.sum()) * volume
-        state = replace(state, cake=state.cake + built, supplied=state.supplied + built)
-        if not state.suspended.any():
-            return state, np.zeros(len(mud))
-        solids = 0.0 * solids
-    first, pores = np.eye(1, len(column.width))[0], rock.porosity * column.volume
+        state = state._replace(cake=state.cake + built, supplied=state.supplied + built)
+        solids, start, slope = 0.0 * solids, 0.0, 0.0
+    inflow[:, 0] = solids
     total = before = state.deposit.sum(axis=0)
     for _ in range(2 if growth.any() else 1):
         catch = rate[:, None] * (1 + growth[:, None] * total) * column.width
-        out, last = _sweep(solids[:, None] * first, state.suspended, pores, catch, volume)
+        out, last = _sweep(inflow, state.suspended, pores, catch, volume)
         caught = np.expm1(catch) * out * volume / column.volume
         total = before + caught.sum(axis=0) / 2
-    start = float(np.sum(rate * (1 + growth * state.face) * solids)) * volume / column.area
-    slope = float(np.sum(rate * growth * solids)) * volume / column.area
-    after = replace(
-        state,
+    after = state._replace(
         suspended=last,
         deposit=state.deposit + caught,
         face=state.face + start * (math.expm1(slope) / slope if slope else 1.0),
         supplied=state.supplied + solids * volume,
         passed=state.passed + out[:, -1] * volume,
-    )
-    return after, out[:, -1]
-
-
-def _backward(
-    state: Filled, column: Column, rock: Rock, release: Release, volume: float
-) -> tuple[Filled, Array]:
-    """The state after a `volume` m3 has flowed back, and the mean that leaves the face (C,)."""
-    pores = rock.porosity * column.volume
-    gone = -np.expm1(-release.rate * column.width / column.volume * volume)
-    freed = (state.deposit - state.held) * gone
-    inflow, none = freed * column.volume / volume, np.zeros_like(freed)
-    out, last = _sweep(inflow[:, ::-1], state.suspended[:, ::-1], pores[::-1], none, volume)
-    loose = release.share * -math.expm1(-release.rate * volume / column.area)
-    after = replace(
-        state,
-        suspended=last[:, ::-1],
-        deposit=state.deposit - freed,
-        face=state.face * (1 - loose),
-        returned=state.returned + out[:, -1] * volume,
     )
     return after, out[:, -1]
 

@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from fdnet.errors import CaseError
 from fdnet.files import write_text
 from fdnet.formation.handed_up import HandedUp, draw_fit, hand_up
 from fdnet.formation.model import (
-    NO_RELEASE,
-    CakeOf,
     Column,
     Flood,
     March,
+    Medium,
     cake_skin,
     damage_skin,
     march,
@@ -28,10 +28,9 @@ from fdnet.run.answer import DAMAGED_FROM, flow_lost, hawkins
 from fdnet.run.finished import FinishedRun
 from fdnet.run.folder import locked
 from fdnet.scales.flow import USUAL_WELL, api_permeability
-from fdnet.spheres.snapshot import Array
 from fdnet.statistics.bands import student_band
 
-CELLS, MOMENTS = 120, 21
+CELLS = 120
 DEPTHS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2)
 """Depths, m, at which a well gives k / k0."""
 SHOTS, SHOT_LENGTH, SHOT_RADIUS = 13.0, 0.3, 0.005
@@ -48,7 +47,7 @@ def core_flood(
     minutes: float = 30.0,
     back_flow: float = 10.0,
     sections: int = 4,
-    **mud: Any,
+    **cake: Any,
 ) -> dict[str, Any]:
     """A core of the specimen's sand flooded with its mud; then the flow is turned back.
 
@@ -59,12 +58,12 @@ def core_flood(
         minutes: of the flood.
         back_flow: pore volumes that flow back, where the run had a clean-up.
         sections: equal ones, between pressure taps.
-        mud: `cake_permeability` m2, or `api_filtrate` m3 that it follows from; `classes` of size.
+        cake: `cake_permeability` m2, or `api_filtrate` m3 that it follows from.
 
     Returns:
         Numbers in SI, with their 95 % bands as `_low` and `_high`: `k_over_k0`, `filtrate_m3`,
-        `effluent_over_c0`, `return_k_over_k0` (None without a clean-up) and others; `sections`,
-        `history`, `handed_up`, `warnings`, and `words`.
+        `effluent_over_c0`, `return_k_over_k0` (after a clean-up) and others; `sections`,
+        `handed_up`, `warnings`, and `words`.
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
@@ -83,56 +82,39 @@ def core_flood(
     drive = Flood(60 * minutes, pressure or math.nan, rate)
 
     def flooded(handed: HandedUp) -> dict[str, Any]:
-        first = 0.01 / (_steepest(handed) + 1 / length)
-        column = Column(edges=steep_grid(length, CELLS, first), area=area)
-        made = _marched(handed, column, [drive], taps)
-        tap, kept, back = np.cumsum(made.parts[-1, ::-1])[::-1], made.k_over_k0[-1], None
-        if handed.release:
+        medium = handed.medium
+        scale = 1 / (_steepest(medium) + 1 / length)
+        column = Column(edges=steep_grid(length, CELLS, scale), area=area)
+        made = march(column, medium, [drive], taps=taps)
+        kept = {"k_over_k0": made.k_over_k0[-1]}
+        if medium.released:
             flow = abs(float(made.rate[0]))
-            seconds = back_flow * handed.rock.porosity * area * length / flow
-            forth = drive._replace(seconds=float(made.time[-1]))
-            back = _marched(handed, column, [forth, Flood(seconds, rate=-flow)], taps).k_over_k0[
-                -1
-            ]
-        solids = sum(one.concentration for one in handed.mud)
-        curves = {
-            "filtrate_m3": made.filtrate,
-            "rate_m3_s": made.rate,
-            "pressure_Pa": made.pressure,
-            "effluent_over_c0": made.effluent.sum(axis=1) / solids,
-        }
-        moments = np.linspace(0.0, drive.seconds, MOMENTS)
-        return _common(handed, column, made) | {
-            "k_over_k0": float(sections / np.sum(1 / kept)),
-            "return_k_over_k0": None if back is None else float(sections / np.sum(1 / back)),
-            **{name: float(curve[-1]) for name, curve in curves.items()},
+            seconds = back_flow * medium.porosity * area * length / flow
+            forth, back = drive._replace(seconds=made.time[-1]), Flood(seconds, rate=-flow)
+            after = march(column, medium, [forth, back], taps=taps).k_over_k0[-1]
+            kept["return_k_over_k0"] = after
+        drops = np.cumsum(made.parts[-1, ::-1])[::-1]
+        table = {"x_lo_m": taps[:-1], "x_hi_m": taps[1:], "pressure_Pa": drops[1:-1], **kept}
+        return {
+            **{name: float(sections / np.sum(1 / of_each)) for name, of_each in kept.items()},
+            **_common(medium, column, made),
+            "rate_m3_s": float(made.rate[-1]),
+            "pressure_Pa": float(drops[0]),
+            "effluent_over_c0": float(made.effluent[-1].sum() / medium.solids),
             "pressure_cake_Pa": float(made.parts[-1, 0]),
-            "sections": [
-                {
-                    "x_lo_m": float(taps[n]),
-                    "x_hi_m": float(taps[n + 1]),
-                    "pressure_Pa": float(tap[n + 1]),
-                    "k_over_k0": float(kept[n]),
-                    "return_k_over_k0": None if back is None else float(back[n]),
-                }
-                for n in range(sections)
-            ],
-            "history": [
-                {"time_s": float(moment)}
-                | {name: float(np.interp(moment, made.time, c)) for name, c in curves.items()}
-                for moment in moments
-                if moment <= made.time[-1]
-            ],
+            "sections": pd.DataFrame(table).to_dict("records"),
         }
 
-    found = _banded(source, flooded, **mud)
-    face, words = found["sections"][0], []
-    words.append(f"A core of {1e3 * length:g} mm keeps {with_band(found, 'k_over_k0')} of its k0.")
-    words.append(f"Its first {1e3 * taps[1]:.3g} mm keep {with_band(face, 'k_over_k0')}.")
-    if face["return_k_over_k0"] is not None:
+    found = _banded(source, flooded, **cake)
+    face = found["sections"][0]
+    words = [
+        f"A core of {1e3 * length:g} mm keeps {with_band(found, 'k_over_k0')} of its k0.",
+        f"Its first {1e3 * taps[1]:.3g} mm keep {with_band(face, 'k_over_k0')}.",
+    ]
+    if (name := "return_k_over_k0") in face:
         words.append(
-            f"After a back-flow of {back_flow:g} pore volumes they are "
-            f"{with_band(found, 'return_k_over_k0')} and {with_band(face, 'return_k_over_k0')}."
+            f"After a back-flow of {back_flow:g} pore volumes they are {with_band(found, name)} "
+            f"and {with_band(face, name)}."
         )
     return found | {"words": words}
 
@@ -144,7 +126,7 @@ def well_invasion(
     height: float = 1.0,
     pressure: float | None = None,
     radius: float | None = None,
-    **mud: Any,
+    **cake: Any,
 ) -> dict[str, Any]:
     """A well drilled through the specimen's sand with its mud, open hole and perforated.
 
@@ -154,13 +136,12 @@ def well_invasion(
         height: m, of the well.
         pressure: Pa, overbalance; that of the case where it is not given.
         radius: m, of the well; that of the case, or 108 mm.
-        mud: as of `core_flood`.
+        cake: as of `core_flood`.
 
     Returns:
-        Numbers in SI, with their 95 % bands as `_low` and `_high`: `filtrate_m3`,
-        `invasion_radius_m`, `skin` of the damage (integrated) and `skin_hawkins`, `flow_lost`
-        (share of the productivity), `skin_cake` while the cake stands, the same `perforated`,
-        `k_over_k0` by depth; `handed_up`, `warnings` and `words`.
+        As `core_flood`: `filtrate_m3`, `invasion_radius_m`, `skin` of the damage (integrated) and
+        `skin_hawkins`, `flow_lost` (share of the productivity), `skin_cake` while the cake
+        stands, the same `perforated`, and `k_over_k0` by depth.
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
@@ -173,52 +154,43 @@ def well_invasion(
     _above_zero(hours=hours, height=height, pressure=pressure, radius=radius)
 
     def drilled(handed: HandedUp) -> dict[str, Any]:
-        case: Any = handed.run.case
+        case, medium = handed.run.case, handed.medium
+        given: Any = case
         usual, outer = USUAL_WELL
         if case.well is not None:
             usual, outer = case.well.radius_m, case.well.drainage_radius_m
-        well, over = radius or usual, pressure or case.fluid.overbalance_Pa
+        well, over = radius or usual, pressure or given.fluid.overbalance_Pa
         if well >= outer:
             raise CaseError(f"radius: {well:g} m, expected below the drainage radius, {outer:g} m")
         if not over:
             raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
-        drive = Flood(3600 * hours, over)
-        hole, made = _around(handed, well, height, outer, drive)
-        shots = SHOTS * SHOT_LENGTH
-        shot, pierced = _around(handed, SHOT_RADIUS, height * shots, outer, drive)
-        loss = handed.rock.loss(made.end.deposit)
-        skin = damage_skin(hole, loss)
-        of_shot = damage_skin(shot, handed.rock.loss(pierced.end.deposit)) / shots
-        bad = np.flatnonzero(1 / loss <= 1 - DAMAGED_FROM)
-        zone = float(hole.edges[bad[-1] + 1]) if len(bad) else 0.0
-        rings = np.diff(hole.reach(hole.edges))[: bad[-1] + 1 if len(bad) else 0]
-        ratio = float(rings.sum() / (rings @ loss[: len(rings)])) if len(bad) else 1.0
-        found = _common(handed, hole, made)
-        pores, middle = (
-            math.pi * handed.rock.porosity * height,
-            (hole.edges[:-1] + hole.edges[1:]) / 2,
-        )
-        if handed.cake:
-            cake = cake_skin("inward", found["cake_thickness_m"], well)
-            found["skin_cake"] = cake * handed.rock.permeability / handed.cake.permeability
-        return found | {
-            "filtrate_m3": float(made.filtrate[-1]),
-            "invasion_radius_m": math.sqrt(well**2 + float(made.filtrate[-1]) / pores),
-            "skin": skin,
-            "skin_hawkins": hawkins(ratio, well=well, damaged=well + zone),
-            "damaged_depth_m": zone,
-            "flow_lost": flow_lost(skin, well=well, drainage=outer),
-            "perforated": {
-                "skin": of_shot,
-                "flow_lost": flow_lost(of_shot, well=well, drainage=outer),
-            },
-            "k_over_k0": [
-                {"depth_m": x, "k_over_k0": float(np.interp(x, middle, 1 / loss, right=1.0))}
-                for x in DEPTHS
-            ],
+        drive, shots = Flood(3600 * hours, over), SHOTS * SHOT_LENGTH
+        hole, made, loss = _around(medium, well, height, outer, drive)
+        shot, _, of_shot = _around(medium, SHOT_RADIUS, height * shots, outer, drive)
+        skins = damage_skin(hole, loss), damage_skin(shot, of_shot) / shots
+        lost = [flow_lost(skin, well=well, drainage=outer) for skin in skins]
+        zone = int(np.max(np.flatnonzero(1 / loss <= 1 - DAMAGED_FROM) + 1, initial=0))
+        rings, depth = np.diff(hole.reach(hole.edges))[:zone], float(hole.edges[zone])
+        ratio = float(rings.sum() / (rings @ loss[:zone])) if zone else 1.0
+        found = _common(medium, hole, made)
+        pores, filtrate = math.pi * medium.porosity * height, found["filtrate_m3"]
+        if medium.cake_permeability:
+            thin = cake_skin("inward", found["cake_thickness_m"], well)
+            found["skin_cake"] = thin * medium.permeability / medium.cake_permeability
+        left = np.interp(DEPTHS, (hole.edges[:-1] + hole.edges[1:]) / 2, 1 / loss, right=1.0)
+        table = pd.DataFrame({"depth_m": DEPTHS, "k_over_k0": left})
+        return {
+            **found,
+            "invasion_radius_m": math.sqrt(well**2 + filtrate / pores),
+            "skin": skins[0],
+            "skin_hawkins": hawkins(ratio, well=well, damaged=well + depth),
+            "damaged_depth_m": depth,
+            "flow_lost": lost[0],
+            "perforated": {"skin": skins[1], "flow_lost": lost[1]},
+            "k_over_k0": table.to_dict("records"),
         }
 
-    found = _banded(source, drilled, shape="inward", **mud)
+    found = _banded(source, drilled, shape="inward", **cake)
     shot = found["perforated"]
     words = [
         f"The damage is a skin of {with_band(found, 'skin')} and costs an open hole "
@@ -238,46 +210,26 @@ def keep(folder: Path, name: str, found: Mapping[str, Any], given: Mapping[str, 
     with locked(folder):
         out.mkdir(exist_ok=True)
         write_text(out / f"{name}.json", plain_json({"given": given, **found})[1] + "\n")
-        draw_fit(hand_up(folder, classes=given.get("classes", 1)), out / "handed_up.svg")
+        draw_fit(hand_up(folder), out / "handed_up.svg")
         if report.is_file():
             put_section(report, FORMATION, formation_html(out))
 
 
 def _around(
-    handed: HandedUp, well: float, height: float, outer: float, drive: Flood
-) -> tuple[Column, March]:
-    """The rock around a hole of radius `well` m as deep as fines get, and the mud in it."""
-    slowest = min((one.rate for one in handed.mud if one.rate > 0), default=1.0)
-    length, first = min(outer - well, 20 / slowest), 0.01 / (_steepest(handed) + 1)
-    column = Column(
-        edges=steep_grid(length, CELLS, first),
-        area=2 * math.pi * well * height,
-        well=well,
-        outer=outer - well,
-    )
-    return column, _marched(handed, column, [drive], None)
+    medium: Medium, well: float, height: float, outer: float, drive: Flood
+) -> tuple[Column, March, np.ndarray]:
+    """The rock around a hole of radius `well` m as deep as fines get, its mud, and k0 / k (J,)."""
+    slowest = min((one.rate for one in medium.mud if one.rate > 0), default=1.0)
+    edges = steep_grid(min(outer - well, 20 / slowest), CELLS, 1 / (_steepest(medium) + 1))
+    area = 2 * math.pi * well * height
+    column = Column(edges=edges, area=area, well=well, outer=outer - well)
+    made = march(column, medium, [drive])
+    return column, made, medium.loss(made.end.deposit.sum(axis=0))
 
 
-def _steepest(handed: HandedUp) -> float:
+def _steepest(medium: Medium) -> float:
     """Rate of filtration at the face when it closes, 1/m."""
-    return max(one.rate * (1 + max(one.growth, 0.0) * handed.closing) for one in handed.mud)
-
-
-def _marched(
-    handed: HandedUp, column: Column, drives: Sequence[Flood], taps: Array | None
-) -> March:
-    viscosity = handed.run.case.fluid.viscosity_Pa_s
-    return march(
-        column,
-        handed.rock,
-        handed.mud,
-        drives,
-        viscosity,
-        cake=handed.cake,
-        closing=handed.closing,
-        release=handed.release or NO_RELEASE,
-        taps=taps,
-    )
+    return max(one.rate * (1 + max(one.growth, 0.0) * medium.closing) for one in medium.mud)
 
 
 _STOPPED = {
@@ -289,12 +241,12 @@ _STOPPED = {
 }
 
 
-def _common(handed: HandedUp, column: Column, made: March) -> dict[str, Any]:
-    cake = handed.cake
-    thick = made.end.cake.sum() / ((1 - cake.porosity) * column.area) if cake else 0.0
+def _common(medium: Medium, column: Column, made: March) -> dict[str, Any]:
+    thick = made.end.cake.sum() / ((1 - medium.cake_porosity) * column.area)
     return {
         "time_s": float(made.time[-1]),
         "closed_at_s": made.closed_at,
+        "filtrate_m3": float(made.filtrate[-1]),
         "cake_thickness_m": float(thick),
         "deposit_m3": float(made.end.deposit.sum(axis=0) @ column.volume),
         "stopped": _STOPPED[made.stopped],
@@ -305,40 +257,28 @@ def _banded(
     source: str | Path | FinishedRun,
     by_model: Callable[[HandedUp], dict[str, Any]],
     *,
-    classes: int = 1,
     shape: str = "linear",
     cake_permeability: float | None = None,
     api_filtrate: float | None = None,
 ) -> dict[str, Any]:
     """What the model gives for all that is handed up, with bands: of seeds, or of the fits."""
     _above_zero(cake_permeability=cake_permeability, api_filtrate=api_filtrate)
-    many = [
-        replace(one, cake=_cake_of(one, shape, cake_permeability, api_filtrate))
-        for one in hand_up(source, classes=classes)
-    ]
+    many = []
+    for one in hand_up(source):
+        medium, known = one.medium, cake_permeability or one.medium.cake_permeability
+        if api_filtrate and not cake_permeability:
+            known = api_permeability(
+                api_filtrate,
+                viscosity=medium.viscosity,
+                solids=medium.solids,
+                porosity=medium.cake_porosity,
+            )
+        cake = replace(medium, cake_permeability=known, cake_shape=shape)
+        many.append(one._replace(medium=cake))
     seeds = len({one.run.path for one in many})
     found = _merged([by_model(one) | {"handed_up": one.values()} for one in many], seeds)
-    notes = dict.fromkeys(note for one in many for note in one.notes)
-    if stopped := found.pop("stopped"):
-        notes[stopped] = None
-    return found | {"seeds": seeds, "warnings": list(notes)}
-
-
-def _cake_of(
-    handed: HandedUp, shape: str, permeability: float | None, api_filtrate: float | None
-) -> CakeOf | None:
-    """The cake of the run, or that which is given, by its permeability or its API filtrate."""
-    porosity = handed.cake.porosity if handed.cake else 0.5
-    if permeability is None and api_filtrate is None:
-        return handed.cake and replace(handed.cake, shape=shape)
-    if permeability is None:
-        permeability = api_permeability(
-            api_filtrate or 0.0,
-            viscosity=handed.run.case.fluid.viscosity_Pa_s,
-            solids=sum(one.concentration for one in handed.mud),
-            porosity=porosity,
-        )
-    return CakeOf(porosity=porosity, permeability=permeability, shape=shape)
+    notes = [note for one in many for note in one.notes] + [found.pop("stopped")]
+    return found | {"seeds": seeds, "warnings": [note for note in dict.fromkeys(notes) if note]}
 
 
 def _merged(trees: Sequence[Any], seeds: int) -> Any:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -42,11 +42,12 @@ from fdnet.network.flow.sections import (
 from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.network import Network, build_network
 from fdnet.report.tables import write_rows
+from fdnet.run.finished import FinishedRun
 from fdnet.run.fluid import FLOW_COLUMNS
 from fdnet.run.folder import RECORD_FORMAT, digests_of
-from fdnet.run.records import FinishedInvasion
+from fdnet.run.records import FinishedInvasion, finer_file
 from fdnet.scales.flow import api_filtrate, darcy_through, path_of
-from fdnet.scales.scales import InvasionScales
+from fdnet.scales.scales import InvasionScales, invasion_scales
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen, resting
 
 if TYPE_CHECKING:
@@ -55,6 +56,8 @@ if TYPE_CHECKING:
 STATE = "classes.npz"
 MOST_ROWS = 20_000
 """Spheres that stand for the fines of a run."""
+FIRST_DRAWN = 10_000_000
+"""Numbers of these spheres begin here, behind those of LIGGGHTS."""
 TRIES = 8
 """Places tried for each of them; the one farthest from the grains is taken."""
 
@@ -258,7 +261,7 @@ def spheres_at_the_end(
         radius.append(np.full(int(one) + int(counts.upstream[i]), own))
     place = np.concatenate(position)
     fines = resting(place, np.concatenate(radius), network.box, Kind.FINE)
-    return replace(fines, id=fines.id + 10_000_000)
+    return replace(fines, id=fines.id + FIRST_DRAWN)
 
 
 def _into_the_box(network: Network, place: Array) -> Array:
@@ -305,6 +308,51 @@ def _before(model: ClassModel, count: int, solids: Deposits, rng: np.random.Gene
     place = low + rng.random((count, 3)) * (high - low)
     place[:, 0] = low[0] - (1e-6 + rng.random(count)) * thickness_of_cake(model.sieve, solids)
     return place
+
+
+class Rested(NamedTuple):
+    """Fines of one kind: where so many m3 rest in a specimen.
+
+    Attributes:
+        name: of the kind.
+        concentration: volume over that of the mud.
+        depth, volume: (N,) m and m3, of each.
+        passed: m3 that got through the specimen.
+        number: of equal fines, or of pores, that would tell as much.
+    """
+
+    name: str
+    concentration: float
+    depth: Array
+    volume: Array
+    passed: float
+    number: float
+
+
+def rested_classes(run: FinishedRun, case: InvasionCase) -> list[Rested]:
+    """The size classes of a finished run, without what the fluid still carries."""
+    model = class_model(case, invasion_scales(case), run.spheres("initial"))
+    name = finer_file(run.manifest["invade"]["steps"]) if case.with_classes else STATE
+    kept = read_classes(run.path / "invade" / name, {})
+    solids = replace(kept.solids, carried=np.zeros_like(kept.solids.carried))
+    volumes = np.array([solids.inside_by_class, solids.passed, 0.0 * solids.cake])
+    counts = model.counted(volumes)
+    x = spheres_at_the_end(case, model, replace(kept, solids=solids), counts).position[:, 0]
+    places = np.concatenate([solids.in_pores + solids.attached, solids.in_throats])
+    number = volumes[0] ** 2 / np.maximum(np.sum(places**2, axis=0), 1e-300)
+    found, last = [], np.cumsum(counts.invaded)
+    for i, (own, rows) in enumerate(zip(model.classes.diameter, counts.invaded, strict=True)):
+        found.append(
+            Rested(
+                name=f"{1e6 * own:.3g} µm",
+                concentration=float(model.classes.concentration[i]),
+                depth=x[last[i] - rows : last[i]],
+                volume=np.full(rows, volumes[0, i] / max(rows, 1)),
+                passed=float(solids.passed[i]),
+                number=min(float(number[i]), float(rows)),
+            )
+        )
+    return found
 
 
 # ------------------------------------------------------------------------------------------------

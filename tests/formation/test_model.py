@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 
 from fdnet.formation.model import (
-    CakeOf,
     Column,
     FineClass,
     Flood,
-    Release,
-    Rock,
+    Medium,
     cake_skin,
     damage_skin,
     march,
@@ -24,23 +22,23 @@ def grid(length, cells):
     return np.linspace(0.0, length, cells + 1)
 
 
-ROCK = Rock(porosity=0.3, permeability=1e-12, damage=40.0)
-MUD = (FineClass("all", concentration=0.01, rate=30.0),)
+ALL = FineClass("all", concentration=0.01, rate=30.0)
+ROCK = Medium(porosity=0.3, permeability=1e-12, damage=40.0, viscosity=1e-3, mud=(ALL,))
 CORE = Column(edges=grid(0.1, 200), area=2e-3)
-VISCOSITY = 1e-3
 
 
-def flood(column, mud, pore_volumes, *, rock=ROCK, **more):
+def flood(column, pore_volumes, *, fineness=0.05, **medium):
     """At a constant rate of 1e-7 m3/s, for so many pore volumes."""
-    seconds = pore_volumes * rock.porosity * column.volume.sum() / 1e-7
-    return march(column, rock, mud, [Flood(seconds=seconds, rate=1e-7)], VISCOSITY, **more)
+    seconds = pore_volumes * ROCK.porosity * column.volume.sum() / 1e-7
+    drive = Flood(seconds=seconds, rate=1e-7)
+    return march(column, replace(ROCK, **medium), [drive], fineness=fineness)
 
 
 @pytest.mark.parametrize("well", [np.inf, 0.05])
 def test_constant_filtration_is_exponential_straight_and_around_a_well(well):
     """c = c0 exp(-rate depth), deposit = rate c0 (V - pore volume behind) / area exp(...)."""
     column = replace(CORE, well=well)
-    end = flood(column, MUD, 40.0).end
+    end = flood(column, 40.0).end
     depth, c0, rate = column.edges, 0.01, 30.0
     steady = c0 * np.exp(-rate * depth[1:])
     assert end.suspended[0] == pytest.approx(steady, rel=1e-9)
@@ -57,7 +55,7 @@ def langmuir_error(cells):
     rate, most, volumes = 30.0, 0.02, 8.0
     mud = (FineClass("all", concentration=0.01, rate=rate, growth=-1 / most),)
     column = Column(edges=grid(0.1, cells), area=2e-3)
-    end = flood(column, mud, volumes, fineness=4.0 / cells).end
+    end = flood(column, volumes, mud=mud, fineness=4.0 / cells).end
     depth = column.edges[1:]
     passed = volumes * ROCK.porosity * 0.1 - ROCK.porosity * depth  # m of fluid since the front
     X, T = rate * depth, rate * 0.01 * passed / most
@@ -80,13 +78,13 @@ def test_no_fines_are_lost_or_made():
     """Several classes, both directions, a cake: to 1e-12 of what was supplied."""
     mud = (FineClass("coarse", 0.01, 80.0, 5.0), FineClass("fine", 0.02, 2.0, -3.0))
     drives = [Flood(seconds=3e4, pressure=2e5), Flood(seconds=3e4, pressure=-1e5)] * 2
-    cake = CakeOf(porosity=0.4, permeability=1e-15)
+    given = {"cake_porosity": 0.4, "cake_permeability": 1e-15, "mud": mud}
+    given |= {"released": 0.6, "release_rate": 20.0}
     well = Column(edges=steep_grid(0.3, 60, 1e-4), area=0.1, well=0.1)
     for column, closing in ((CORE, 0.05), (CORE, 0.5), (well, 0.05)):
-        more = {"cake": cake, "closing": closing, "release": Release(share=0.6, rate=20.0)}
-        made = march(column, ROCK, mud, drives, VISCOSITY, **more)
-        end = made.end
-        where = end.kept(column, ROCK) + end.passed + end.returned
+        end = march(column, replace(ROCK, closing=closing, **given), drives).end
+        inside = (ROCK.porosity * end.suspended + end.deposit) @ column.volume
+        where = inside + end.cake + end.passed + end.returned
         assert end.supplied == pytest.approx(where, rel=1e-12)
         assert np.all(end.supplied > 0)
         assert np.all(end.returned > 0)
@@ -96,35 +94,32 @@ def test_no_fines_are_lost_or_made():
 
 def test_the_pressure_of_a_core_rises_in_a_line_after_the_breakthrough():
     """dp / dp0 has the slope beta porosity c0 (1 - exp(-rate length)) a pore volume."""
-    rock = replace(ROCK, power=1.0)
-    made = flood(CORE, MUD, 50.0, rock=rock)
-    volumes = made.filtrate / (rock.porosity * CORE.volume.sum())
+    made = flood(CORE, 50.0, power=1.0)
+    volumes, pressure = made.filtrate / (ROCK.porosity * CORE.volume.sum()), made.parts.sum(axis=1)
     late = volumes > 10
-    slopes = np.diff(made.pressure[late] / made.pressure[0]) / np.diff(volumes[late])
-    exact = rock.damage * rock.porosity * 0.01 * (1 - np.exp(-30.0 * 0.1))
+    slopes = np.diff(pressure[late] / pressure[0]) / np.diff(volumes[late])
+    exact = ROCK.damage * ROCK.porosity * 0.01 * (1 - np.exp(-30.0 * 0.1))
     assert slopes == pytest.approx(exact, rel=1e-6)
 
 
 def test_the_face_closes_when_its_deposit_is_full():
     """t* = deposit / (rate u c0) (Pang and Sharma 1997), and with a growing rate its logarithm."""
-    cake = CakeOf(porosity=0.5, permeability=1e-14)
-    made = flood(CORE, MUD, 50.0, closing=0.02, cake=cake)
+    made = flood(CORE, 50.0, closing=0.02, cake_permeability=1e-14)
     assert made.closed_at == pytest.approx(0.02 / (30.0 * 1e-7 / 2e-3 * 0.01), rel=1e-12)
-    growing = (MUD[0]._replace(growth=50.0),)
-    made = flood(CORE, growing, 50.0, closing=0.02, cake=cake)
+    growing = (ALL._replace(growth=50.0),)
+    made = flood(CORE, 50.0, closing=0.02, cake_permeability=1e-14, mud=growing)
     exact = np.log1p(50.0 * 0.02) / (50.0 * 30.0 * 1e-7 / 2e-3 * 0.01)
     assert made.closed_at == pytest.approx(exact, rel=1e-12)
 
 
 def test_a_cake_at_constant_pressure_is_ruths():
     """t / V is a line in V, of slope mu c0 / (2 dp k_c (1 - phi_c - c0)) per area (Ruth 1935)."""
-    cake = CakeOf(porosity=0.4, permeability=1e-17)
-    drive = [Flood(seconds=3600.0, pressure=7e5)]
-    made = march(CORE, ROCK, MUD, drive, VISCOSITY, cake=cake, closing=0.0)
+    caked = replace(ROCK, cake_porosity=0.4, cake_permeability=1e-17, closing=0.0)
+    made = march(CORE, caked, [Flood(seconds=3600.0, pressure=7e5)])
     v = made.filtrate[1:] / CORE.area
     slope, start = np.polyfit(v, made.time[1:] / v, 1)
-    assert slope == pytest.approx(VISCOSITY * 0.01 / (2 * 7e5 * 1e-17 * (0.6 - 0.01)), rel=1e-9)
-    assert start == pytest.approx(VISCOSITY * 0.1 / ROCK.permeability / 7e5, rel=1e-6)
+    assert slope == pytest.approx(1e-3 * 0.01 / (2 * 7e5 * 1e-17 * (0.6 - 0.01)), rel=1e-9)
+    assert start == pytest.approx(1e-3 * 0.1 / ROCK.permeability / 7e5, rel=1e-6)
     assert made.time[-1] == 3600.0
 
 
@@ -138,11 +133,11 @@ def test_one_damaged_zone_has_hawkins_skin():
 
 
 def test_a_wide_well_is_a_straight_core():
-    straight = flood(CORE, MUD, 5.0)
-    wide = flood(replace(CORE, well=1e7), MUD, 5.0)
+    straight = flood(CORE, 5.0)
+    wide = flood(replace(CORE, well=1e7), 5.0)
     assert wide.end.deposit == pytest.approx(straight.end.deposit, rel=1e-6)
-    assert wide.pressure == pytest.approx(straight.pressure, rel=1e-6)
-    narrow = flood(replace(CORE, well=0.05), MUD, 5.0)
+    assert wide.parts[:, 1] == pytest.approx(straight.parts[:, 1], rel=1e-6)
+    narrow = flood(replace(CORE, well=0.05), 5.0)
     assert narrow.end.deposit[0, -1] < 0.7 * straight.end.deposit[0, -1]
 
 
@@ -159,10 +154,10 @@ def test_the_skin_of_a_cake_has_the_shapes_of_opm():
 
 def test_a_schedule_keeps_rate_and_pressure():
     drives = [Flood(seconds=100.0, rate=1e-7), Flood(seconds=200.0, pressure=1e5)]
-    made = march(CORE, ROCK, MUD, drives, VISCOSITY)
+    made = march(CORE, ROCK, drives)
     first = made.time <= 100.0
     assert made.rate[first] == pytest.approx(1e-7, rel=1e-12)
-    assert made.pressure[~first] == pytest.approx(1e5, rel=1e-12)
+    assert made.parts.sum(axis=1)[~first] == pytest.approx(1e5, rel=1e-12)
     assert made.filtrate[first][-1] == pytest.approx(1e-5, rel=1e-12)
     assert np.sum(made.time == 100.0) == 1
     assert made.time[-1] == 300.0
@@ -174,8 +169,9 @@ def test_more_back_flow_returns_more_and_the_section_at_the_face_least():
     returned = []
     for seconds in (0.0, 1e4, 3e4, 1e6):
         back = [Flood(seconds=seconds, rate=-1e-7)] if seconds else []
-        more = {"release": Release(share=0.8, rate=5.0), "taps": np.linspace(0.0, 0.1, 5)}
-        returned.append(march(CORE, ROCK, MUD, [forth, *back], VISCOSITY, **more).k_over_k0[-1])
+        loose = replace(ROCK, released=0.8, release_rate=5.0)
+        made = march(CORE, loose, [forth, *back], taps=np.linspace(0.0, 0.1, 5))
+        returned.append(made.k_over_k0[-1])
     assert np.all(np.diff(returned, axis=0) > 0)
     assert np.all(np.diff(returned, axis=1) > 0)
     held = 0.2 * 30.0 * 0.01 * 6e4 * 1e-7 / 2e-3 * (1 - np.exp(-30.0 * 0.025)) / (30.0 * 0.025)
@@ -184,9 +180,9 @@ def test_more_back_flow_returns_more_and_the_section_at_the_face_least():
 
 def test_a_cake_that_fills_the_well_ends_the_march():
     column = Column(edges=grid(0.01, 20), area=1.0, well=0.05, outer=100.0)
-    cake = CakeOf(porosity=0.4, permeability=1e-11, shape="inward")
+    cake = {"cake_porosity": 0.4, "cake_permeability": 1e-11, "cake_shape": "inward"}
     drive = [Flood(seconds=1e9, pressure=1e6)]
-    made = march(column, ROCK, MUD, drive, VISCOSITY, cake=cake, closing=0.0)
+    made = march(column, replace(ROCK, closing=0.0, **cake), drive)
     assert made.stopped == "full"
     solids = made.end.cake.sum()
     assert solids / (0.6 * 1.0 * 0.05 / 2) == pytest.approx(1.0, rel=0.06)
@@ -215,11 +211,15 @@ def test_fourteen_cores_by_order_of_magnitude():
     solids, area = 40 / 2440, 20.42e-4
     column = Column(edges=grid(0.1016, 20), area=area)
     for pressure, filtrate, k, porosity, cake_k, depth in rows:
-        rock = Rock(porosity=porosity, permeability=k * 1e-15, damage=0.0)
-        cake = CakeOf(porosity=0.1, permeability=cake_k * 1e-21)
-        drive = [Flood(37.5 * 60, pressure * 1e6)]
-        mud = [FineClass("solids", solids, 0.0)]
-        made = march(column, rock, mud, drive, 1e-3, cake=cake, closing=0.0)
+        rock = Medium(
+            porosity=porosity,
+            permeability=k * 1e-15,
+            mud=(FineClass("solids", solids, 0.0),),
+            closing=0.0,
+            cake_porosity=0.1,
+            cake_permeability=cake_k * 1e-21,
+        )
+        made = march(column, rock, [Flood(37.5 * 60, pressure * 1e6)])
         assert 1 / 1.4 < made.filtrate[-1] / (filtrate * 1e-6) < 1.4
         piston = made.filtrate[-1] / (area * porosity * (1 - 0.3))
         assert 1 / 12 < piston / (depth / 100) < 1.2
