@@ -140,8 +140,7 @@ def test_parts_are_done_side_by_side_and_their_results_are_in_order(monkeypatch)
 def test_several_cores_give_the_same_bits_as_one(monkeypatch):
     pack = with_fines(random_pack(40), 150, 0.2)
     together = build_network(pack, periodic="yz")
-    for part_of in (lubrication, deposit):
-        monkeypatch.setattr(part_of, "THROATS", 60)
+    monkeypatch.setattr(lubrication, "THROATS", 60)
     assert deposit.bounded_by_fines(together).sum() > 4 * 60  # several parts for each of the laws
     results = []
     for cores in (1, 4):

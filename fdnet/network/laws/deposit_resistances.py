@@ -6,25 +6,11 @@ those of `lubrication`, narrowed by the spheres around.
 
 import numpy as np
 
-from fdnet.network import geometry
-from fdnet.network.compiled import on_all_cores
-from fdnet.network.laws.cross_section import OPEN, section_fluxes, shapes_of
-from fdnet.network.laws.lubrication import THROATS, half_resistances, sections_of, spans_of
-from fdnet.network.laws.reaching_grains import sphere_trees, spheres_around
-from fdnet.network.laws.wedges import OPEN_WIDENING, WIDENING, resistance_of
-from fdnet.network.network import LENGTH_FLOOR, Network
+from fdnet.network.laws.lubrication import half_resistances, side_resistances
+from fdnet.network.laws.wedges import WIDENING
+from fdnet.network.network import Network
 from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array
-
-# ------------------------------------------------------------------------------------------------
-# Resistance of throats that a fine bounds.
-#
-# Where a fine and grains bound a throat, its sections are open on the side on which the fine has
-# ended, and what holds the fluid there are the spheres that stand beyond the triangle.
-
-
-STEPS = 4
-"""Steps in height between the facet and a node; with 8, k of slabs changes by 0.2 % on average."""
 
 
 def bounded_by_fines(network: Network) -> Array:
@@ -44,33 +30,6 @@ def mixed_pores(network: Network) -> Array:
     some = np.bincount(group, weights=fine.any(axis=1), minlength=count) > 0
     grains = np.bincount(group, weights=~fine.all(axis=1), minlength=count) > 0
     return some & grains
-
-
-def open_resistances(network: Network, throats: Array, heights: Array) -> tuple[Array, Array]:
-    """Resistance (K, 2) 1/m3 of the sides of `throats` (K,), and how narrow they are at the ends.
-
-    The second is 1/a (K, 3) 1/m at both nodes and at the facet, where a is the radius of the round
-    tube that carries as much; nan where the throat has no such section, or a closed one. A
-    resistance is 0 where the throat has no side, and infinite where a section is closed. `heights`
-    (T, 2) m are those of the nodes of all throats.
-    """
-    trees, floor = sphere_trees(network), LENGTH_FLOOR * network.grain_radius
-    resistance, ends = np.zeros((len(throats), 2)), np.full((len(throats), 3), np.nan)
-
-    def measure(part: slice) -> None:
-        here = np.flatnonzero((throats >= part.start) & (throats < part.stop))
-        some = throats[here] - part.start
-        near = spheres_around(network, part, some, heights[part], trees)
-        sections = sections_of(some, spans_of(heights[throats[here]], floor), STEPS + 1)
-        shapes = shapes_of(network, part)
-        flux = section_fluxes(shapes, sections, near, OPEN)[0]
-        own, row = shapes.part[sections.throat], here[np.searchsorted(some, sections.throat)]
-        resistance[row, sections.side] = resistance_of(flux, own, sections.step, OPEN_WIDENING)
-        tube = np.where(flux > 0.0, 8.0 / np.pi * flux, np.nan) ** -0.25
-        ends[row, sections.side], ends[row, 2] = tube[:, -1], tube[:, 0]
-
-    on_all_cores(measure, geometry.slices(len(network.throat_pores), THROATS))
-    return resistance, ends
 
 
 # ------------------------------------------------------------------------------------------------
@@ -100,14 +59,14 @@ def deposit_resistances(network: Network) -> Array:
     """
     bounded, mixed = bounded_by_fines(network), mixed_pores(network)
     heights = nodes_of(network).heights
-    halves = half_resistances(network, around=True, heights=heights, but=bounded)
+    halves, _ = side_resistances(network, ~bounded, heights, around=True)
     near = mixed[network.pore_group[network.throat_pores]].any(axis=1)
-    throats = np.flatnonzero(bounded | (near & np.isfinite(halves.sum(axis=1))))
-    if not len(throats):
-        return halves
-    own, ends = open_resistances(network, throats, heights)
-    halves[bounded] = own[bounded[throats]]
-    halves[throats] += node_resistances(network, throats, halves[throats], ends, mixed)
+    wanted = bounded | (near & np.isfinite(halves.sum(axis=1)))
+    if wanted.any():
+        own, ends = side_resistances(network, wanted, heights, around=True, among_all=True)
+        halves[bounded], throats = own[bounded], np.flatnonzero(wanted)
+        added = node_resistances(network, throats, halves[throats], ends[throats], mixed)
+        halves[throats] += added
     return halves
 
 
@@ -129,7 +88,7 @@ def node_resistances(
         network: of grains and fines.
         throats: those that bound the mixed pores.
         halves: (K, 2) 1/m3, their resistances to the nodes.
-        ends: (K, 3) 1/m, 1/a at both nodes and at the facet (`open_resistances`).
+        ends: (K, 3) 1/m, 1/a at both nodes and at the facet (`side_resistances`).
         mixed: (G,) whether the polyhedra are `mixed_pores`.
     """
     pores = network.pore_group[network.throat_pores[throats]]

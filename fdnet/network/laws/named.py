@@ -1,9 +1,8 @@
-"""The laws of clean throats, and all laws by name.
+"""Three laws of clean throats, and all laws by name.
 
-Conductance of clean throats: three laws.
-
-Each law takes a Network and returns the conductance g (T,) m3 of its throats. Viscosity is
-factored out: flux = g dp / mu, with the pressure drop dp along the throat and the viscosity mu.
+Each law of clean throats takes a Network and returns the conductance g (T,) m3 of its throats.
+Viscosity is factored out: flux = g dp / mu, with the pressure drop dp along the throat and the
+viscosity mu.
 """
 
 from collections.abc import Callable, Mapping
@@ -11,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from fdnet.errors import CaseError
+from fdnet.names import SECTION_ARCHIE
 from fdnet.network.laws.damage import CODE_THRESHOLD, TEXT_THRESHOLD, DamageLaw, thesis_damage
 from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.laws.section_archie import section_archie_damage
@@ -62,12 +61,10 @@ Examples:
     ['effective', 'lubrication', 'thesis']
 """
 
-_THESIS_THRESHOLDS = {"thesis": TEXT_THRESHOLD, "thesis-code": CODE_THRESHOLD}
-
 DAMAGE_LAWS: Mapping[str, DamageLaw] = {
     "thesis": thesis_damage,
     "thesis-code": partial(thesis_damage, clogging_threshold=CODE_THRESHOLD),
-    "section-archie": section_archie_damage,
+    SECTION_ARCHIE: section_archie_damage,
 }
 """Damage laws by name: functions that lower the clean conductance (T,) m3 of throats with fines.
 
@@ -88,19 +85,9 @@ def damage_law(
         clogging_threshold: throat porosity below which the thesis laws take a throat as clogged;
             None for the threshold of the law. Only these two laws have options.
         middle_band: see `thesis_damage`.
-
-    Raises:
-        CaseError: the name is unknown.
     """
-    if name not in DAMAGE_LAWS:
-        raise CaseError(
-            f"analysis.damage_law: {name!r} is not known; choose one of {sorted(DAMAGE_LAWS)}"
-        )
-    if name not in _THESIS_THRESHOLDS:
-        return DAMAGE_LAWS[name]
-    own = _THESIS_THRESHOLDS[name]
-    return partial(
-        thesis_damage,
-        clogging_threshold=own if clogging_threshold is None else clogging_threshold,
-        middle_band=middle_band,
-    )
+    if name == SECTION_ARCHIE:
+        return section_archie_damage
+    own = CODE_THRESHOLD if name == "thesis-code" else TEXT_THRESHOLD
+    threshold = own if clogging_threshold is None else clogging_threshold
+    return partial(thesis_damage, clogging_threshold=threshold, middle_band=middle_band)

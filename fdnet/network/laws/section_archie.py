@@ -30,16 +30,8 @@ from fdnet.network.laws.cross_section import (
     shapes_of,
 )
 from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
-from fdnet.network.laws.lubrication import (
-    STEPS,
-    THROATS,
-    sections_of,
-    spans_of,
-)
-from fdnet.network.laws.reaching_grains import (
-    SpheresBeside,
-    facet_axes,
-)
+from fdnet.network.laws.lubrication import STEPS, THROATS, sections_of, spans_of
+from fdnet.network.laws.reaching_grains import SpheresBeside, facet_axes
 from fdnet.network.laws.wedges import WIDENING, resistance_of
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.network.nodes import nodes_of
@@ -127,61 +119,52 @@ def parts_of(network: Network) -> Iterator[ThroatPart]:
         )
 
 
-class FineImages:
-    """Spheres at `position` (N, 3) m of `radius` (N,) m, with their images near all throats.
+def images_of(network: Network, position: Array, radius: Array) -> list[tuple[Array, Array]]:
+    """Spheres at `position` (N, 3) m of `radius` (N,) m and their images near all throats.
 
-    The images are shifted or mirrored. A fine that is centred on or beyond a face that is not
-    periodic has no mirror image there: its body inside the box is that of the sphere itself.
+    They are divided by size. The images are shifted or mirrored. A fine that is centred on or
+    beyond a face that is not periodic has no mirror image there: its body inside the box is that
+    of the sphere itself.
     """
+    used = np.zeros(len(network.image_position), bool)
+    used[network.throat_images] = True
+    corner = network.image_position[used]
+    low, high = corner.min(axis=0), corner.max(axis=0)
+    images = []
+    for some in size_classes(radius) if len(radius) else []:
+        own = radius[some]
+        place, owner = images_near(network, position[some], low, high, float(own.max()))
+        images.append((place, own[owner]))
+    return images
 
-    def __init__(self, network: Network, position: Array, radius: Array) -> None:
-        used = np.zeros(len(network.image_position), bool)
-        used[network.throat_images] = True
-        corner = network.image_position[used]
-        low, high = corner.min(axis=0), corner.max(axis=0)
-        self._classes: list[tuple[Array, Array]] = []
-        for some in size_classes(radius) if len(radius) else []:
-            own = radius[some]
-            place, owner = images_near(network, position[some], low, high, float(own.max()))
-            self._classes.append((place, own[owner]))
 
-    def beside(self, part: ThroatPart, rows: Array | None = None) -> SpheresBeside:
-        """The fines that reach into the prisms of throats (K), or into those of `rows` alone."""
-        throats, places = [np.zeros(0, np.intp)], [np.zeros((0, 5))]
-        for throat, place in self._reaching(part, rows):
-            throats.append(throat)
-            places.append(place)
-        throat, place = np.concatenate(throats), np.concatenate(places)
-        order = np.lexsort((*place[:, 2::-1].T, throat))  # whatever order the search has
-        first = np.searchsorted(throat[order], np.arange(len(part.low) + 1))
-        return SpheresBeside(first=first, place=place[order])
-
-    def reached(self, part: ThroatPart) -> Array:
-        """Whether a fine reaches into the prism of each throat (K,)."""
-        some = np.zeros(len(part.low), bool)
-        for throat, _ in self._reaching(part, None):
-            some[throat] = True
-        return some
-
-    def _reaching(self, part: ThroatPart, rows: Array | None) -> Iterator[tuple[Array, Array]]:
-        """The throat (N,) and `place` (N, 5) of fines of one size after the other, not sorted."""
-        rows = np.arange(len(part.low)) if rows is None else rows
-        low, high = part.low[rows], part.high[rows]
-        for position, radius in self._classes:
-            widest = float(radius.max())
-            row, image = points_in_boxes(position, low - widest, high + widest)
-            reach = radius[image, None]  # its own, whatever other fines are in the class
-            near = (position[image] >= low[row] - reach) & (position[image] <= high[row] + reach)
-            row, image = (one[near.all(axis=1)] for one in (row, image))
-            throat = rows[row]
-            away = position[image] - part.origin[throat]
-            place = np.ones((len(throat), 5))
-            for k, axis in enumerate(part.axes):
-                place[:, k] = geometry.dot(away, axis[throat])
-            place[:, 3] = radius[image]
-            real = np.zeros(len(throat), bool)
-            _set_reaching(part.shapes, part.ends, throat, place, np.empty((4, 3)), real)
-            yield throat[real], place[real]
+def fines_beside(
+    images: list[tuple[Array, Array]], part: ThroatPart, rows: Array | None = None
+) -> SpheresBeside:
+    """The fines that reach into the prisms of throats (K), or into those of `rows` alone."""
+    rows = np.arange(len(part.low)) if rows is None else rows
+    low, high = part.low[rows], part.high[rows]
+    throats, places = [np.zeros(0, np.intp)], [np.zeros((0, 5))]
+    for position, radius in images:
+        widest = float(radius.max())
+        row, image = points_in_boxes(position, low - widest, high + widest)
+        reach = radius[image, None]  # its own, whatever other fines are in the class
+        near = (position[image] >= low[row] - reach) & (position[image] <= high[row] + reach)
+        row, image = (one[near.all(axis=1)] for one in (row, image))
+        throat = rows[row]
+        away = position[image] - part.origin[throat]
+        place = np.ones((len(throat), 5))
+        for k, axis in enumerate(part.axes):
+            place[:, k] = geometry.dot(away, axis[throat])
+        place[:, 3] = radius[image]
+        real = np.zeros(len(throat), bool)
+        _set_reaching(part.shapes, part.ends, throat, place, np.empty((4, 3)), real)
+        throats.append(throat[real])
+        places.append(place[real])
+    throat, place = np.concatenate(throats), np.concatenate(places)
+    order = np.lexsort((*place[:, 2::-1].T, throat))  # whatever order the search has
+    first = np.searchsorted(throat[order], np.arange(len(part.low) + 1))
+    return SpheresBeside(first=first, place=place[order])
 
 
 @loops_in_place
@@ -222,12 +205,12 @@ def fine_resistances(
     and are not counted. `parts` is what `parts_of` gives for the network, made anew without it.
     `step` is as `STEP`.
     """
-    images = FineImages(network, fines.position, fines.radius)
+    images = images_of(network, fines.position, fines.radius)
     floor = LENGTH_FLOOR * network.grain_radius
     coarse, both = 0, np.ones((2, len(network.throat_pores), 2))
     for part in parts_of(network) if parts is None else parts:
         rows = None if among is None else np.flatnonzero(among[part.throats])
-        beside = images.beside(part, rows)
+        beside = fines_beside(images, part, rows)
         some, steps = _steps(beside, part.heights, step)
         coarse += int(np.sum(steps > MOST_STEPS))
         steps = np.minimum(steps, MOST_STEPS)
@@ -305,10 +288,13 @@ class KeptSections:
         new, old = unmoved((fines.id, fines.position), (self.fines.id, self.fines.position))
         gone, come = np.ones(len(self.fines), bool), np.ones(len(fines), bool)
         gone[old] = come[new] = False
-        reached = self._throats_beside(
+        images = images_of(
+            self.network,
             np.concatenate([self.fines.position[gone], fines.position[come]]),
             np.concatenate([self.fines.radius[gone], fines.radius[come]]),
         )
+        each = [np.diff(fines_beside(images, part).first) > 0 for part in self.parts]
+        reached = np.concatenate(each)
         both = fine_resistances(
             self.network, fines, among=reached, parts=self.parts, step=self.step
         )[:2]
@@ -323,11 +309,6 @@ class KeptSections:
             raised=frozen(raised),
             renewed=int(reached.sum()),
         )
-
-    def _throats_beside(self, position: Array, radius: Array) -> Array:
-        """Whether spheres at `position` (N, 3) m of `radius` (N,) m reach into each throat."""
-        images = FineImages(self.network, position, radius)
-        return np.concatenate([images.reached(part) for part in self.parts])
 
 
 def measured_sections(
