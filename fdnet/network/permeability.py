@@ -394,7 +394,7 @@ def permeability(
         >>> points = np.indices((3, 3, 3)).reshape(3, -1).T + 0.5
         >>> result = fdnet.permeability(points, 0.5, [3, 3, 3])
         >>> print(f"{result.k_m2:.3g} m2, {result.k_mD:.0f} mD, porosity {result.porosity:.3f}")
-        2.52e-09 m2, 2551711 mD, porosity 0.476
+        2.52e-09 m2, 2551691 mD, porosity 0.476
         >>> fdnet.permeability(points, 0.5, [3, 3, 3], axis="all").to_frame().axis.tolist()
         ['x', 'y', 'z']
     """
