@@ -373,6 +373,15 @@ class CleanUp(Part):
     drawdown_Pa: ClassVar = InSI[float]("drawdown_MPa", 1e6)
     duration_s: ClassVar = InSI[float | None]("duration_ms", 1e-3)
 
+    def fluid_of(self, fluid: Fluid) -> Fluid:
+        """The fluid with the drawdown for its overbalance."""
+        return fluid.model_copy(update={"overbalance_MPa": self.drawdown_MPa})
+
+    def run_of(self, run: Run) -> Run:
+        """The control of the invasion with the length of the clean-up."""
+        own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
+        return run.model_copy(update=own | {"duration_ms": self.duration_ms})
+
 
 class InvasionChoices(Part):
     """[invasion], how the mud is let in: as spheres, or as size classes on the pore network.
