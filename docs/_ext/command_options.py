@@ -1,11 +1,11 @@
-"""Options of each command of fdnet as rows of a table, from its own parser."""
+"""Options of each command of fdnet, from its own parser."""
 
 import argparse
 import re
 from collections import Counter
 from collections.abc import Iterator
 
-SHARED = 3
+SHARED = 2
 """An option that means the same to so many commands is explained once."""
 
 
@@ -17,9 +17,9 @@ def commands() -> dict[str, argparse.ArgumentParser]:
 
 
 def shared_rows() -> list[tuple[str, str]]:
-    """Name and meaning of the arguments that `SHARED` or more commands take, in Markdown."""
+    """Name and meaning of the options that `SHARED` or more commands take, in Markdown."""
     rows = Counter(row for parser in commands().values() for row in _rows(parser))
-    return sorted(row for row, count in rows.items() if count >= SHARED)
+    return sorted(row for row, count in rows.items() if count >= SHARED and "--" in row[0])
 
 
 def own_rows(name: str) -> list[tuple[str, str]]:

@@ -1,8 +1,8 @@
-"""The tables of the case reference and of the commands, written into their pages.
+"""The tables of the case reference and the lists of options, written into their pages.
 
     python docs/_ext/reference_tables.py --write    # after a change of a key or an option
 
-Each table stands between two comments, `<!-- case-keys grains -->` (or `command-options run`, or
+Each stands between two comments, `<!-- case-keys grains -->` (or `command-options run`, or
 `shared-options`) and `<!-- end -->`, so the pages are whole as plain Markdown, too.
 """
 
@@ -32,20 +32,16 @@ def filled(page: str) -> str:
 def warnings_page() -> str:
     """The page of all warnings."""
 
-    def filled(text: str) -> list[str]:
-        return textwrap.wrap(text, 99, break_on_hyphens=False, break_long_words=False)
-
     opening = (
-        "A warning names something that is valid but doubtful, and the run goes on. It ends with "
-        "its place on this page, which says what follows from it and what to do. What `fdnet "
-        "check` finds odd about sizes, speed and supply says all this itself."
+        "A warning names something that is valid but doubtful, and the run goes on. Here stands "
+        "what follows from it and what to do. Findings of `fdnet check` say this themselves."
     )
-    lines = ["# Warnings", "", *filled(opening)]
+    lines = ["# Warnings", "", *_wrapped(opening)]
     for key, entry in catalogue().items():
         title, *said = (
             one[0].upper() + one[1:] for one in (key.replace("-", " "), entry.follows, entry.do)
         )
-        lines += ["", f"## {title}", "", *filled(f"{'. '.join(said)}. [More](../{entry.read})")]
+        lines += ["", f"## {title}", "", *_wrapped(f"{'. '.join(said)}. [More](../{entry.read})")]
     return "\n".join(lines) + "\n"
 
 
@@ -53,7 +49,14 @@ def _table(kind: str, name: str | None) -> str:
     if kind == "case-keys":
         return _lines(("Key", "Default", "Meaning"), list(key_rows(name or "")))
     rows = shared_rows() if kind == "shared-options" else own_rows(str(name))
-    return _lines(("Argument", "Meaning"), rows)
+    items = (_wrapped(f"- {option}: {meaning}", "  ") for option, meaning in rows)
+    return "".join(f"{line}\n" for item in items for line in item)
+
+
+def _wrapped(text: str, indent: str = "") -> list[str]:
+    return textwrap.wrap(
+        text, 99, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False
+    )
 
 
 def _lines(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

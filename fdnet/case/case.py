@@ -49,10 +49,9 @@ class Case(tables.Part):
     """
 
     name: Annotated[str, Field(min_length=1, pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")]
-    """Name of the case: letters, digits, dot, underscore and hyphen. It also names the run folder.
-    """
+    """Name of case and run folder: letters, digits, dot, underscore and hyphen."""
     seed: Annotated[int, Field(ge=0, lt=2**31)] = 1
-    """Seed of all random numbers. The same case and seed give the same result."""
+    """Seed of all random numbers."""
     box: tables.Box
     grains: Grains
     fluid: tables.Fluid = tables.Fluid()

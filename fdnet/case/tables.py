@@ -184,7 +184,7 @@ class Bonds(Part):
     """
 
     radius_ratio: Annotated[float, Field(gt=0, le=1)]
-    """Radius of a bond over that of the smaller of its two grains."""
+    """Radius of a bond over that of the smaller grain."""
     normal_stiffness_GPa_m: Positive = 95.0
     """Normal stiffness of a bond per area of its disc."""
     shear_stiffness_GPa_m: Positive = 40.0
@@ -195,7 +195,7 @@ class Bonds(Part):
     shear_strength_MPa: Positive | None = None
     """Largest shear stress of a bond."""
     gap_ratio: Annotated[float, Field(ge=0, le=0.5)] = 0.01
-    """Widest gap that a bond bridges, over the smaller diameter of its two grains."""
+    """Widest gap that a bond bridges, over the smaller diameter."""
 
     normal_stiffness_Pa_m: ClassVar = InSI[float]("normal_stiffness_GPa_m", 1e9)
     shear_stiffness_Pa_m: ClassVar = InSI[float]("shear_stiffness_GPa_m", 1e9)
@@ -373,6 +373,15 @@ class CleanUp(Part):
     drawdown_Pa: ClassVar = InSI[float]("drawdown_MPa", 1e6)
     duration_s: ClassVar = InSI[float | None]("duration_ms", 1e-3)
 
+    def fluid_of(self, fluid: Fluid) -> Fluid:
+        """The fluid with the drawdown for its overbalance."""
+        return fluid.model_copy(update={"overbalance_MPa": self.drawdown_MPa})
+
+    def run_of(self, run: Run) -> Run:
+        """The control of the invasion with the length of the clean-up."""
+        own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
+        return run.model_copy(update=own | {"duration_ms": self.duration_ms})
+
 
 class InvasionChoices(Part):
     """[invasion], how the mud is let in: as spheres, or as size classes on the pore network.
@@ -434,7 +443,7 @@ class AnalysisChoices(Part):
     """
 
     sections: Sections = 8
-    """Number of equal slabs along the flow. In Python also their edges (S+1,), m."""
+    """Number of equal slabs along the flow; in Python also their edges, m."""
     law: LawName = DEFAULT_LAW
     """Conductance of a clean throat."""
     damage_law: DamageLawName = Field(
@@ -452,7 +461,7 @@ class AnalysisChoices(Part):
     throat_overlap: Literal["exact", "two-plane"] = "exact"
     """Volume of a fine in a throat: exact, or by the thesis's two planes."""
     profile_bin_mm: Positive | None = 0.25
-    """Width of the bins of `profile.csv`. In Python also None, the mean radius of the grains."""
+    """Width of the bins of `profile.csv`."""
     walls: WallName = "no-slip"
     """Whether side walls hold the fluid; the thesis's laws do not know it."""
 

@@ -311,9 +311,7 @@ def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
 
     What its table [run] says of the length of the invasion is that of the clean-up.
     """
-    own = dict.fromkeys(("cap_ms", "plug_time_ms", "checkpoint_ms"))
-    run = case.run.model_copy(update=own | {"duration_ms": choices.duration_ms})
-    fluid = case.fluid.model_copy(update={"overbalance_MPa": choices.drawdown_MPa})
+    fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
     turned, asked = case.model_copy(update={"fluid": fluid, "run": run}), case.drag
     if asked.drive_velocity_m_s != "fluid":
         porosity = target_porosity(case)
