@@ -195,8 +195,8 @@ class Entry:
     """One kind of warning."""
 
     key: str  # its place on the page
-    follows: str  # what follows
-    do: str  # what to do
+    follows: str
+    do: str
     read: str  # page of the documentation
     says: tuple[str, ...] = ()  # which of "follows" and "do" the warning says itself
 

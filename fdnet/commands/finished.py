@@ -58,8 +58,7 @@ def _stokes(options: argparse.Namespace) -> int:
             print(line, file=sys.stderr, flush=True)
 
     across = ACROSS_A_FINE if options.across is None else options.across
-    numbers = options.section or (1,)
-    rows = stokes_sections(options.run, numbers, across=across, follow=follow)
+    rows = stokes_sections(options.run, options.section or (1,), across=across, follow=follow)
     if options.json:
         print(json.dumps(rows, indent=2))
     else:
@@ -84,11 +83,8 @@ def _text(row: Mapping[str, Any]) -> str:
         ("its finer cells, µm", *cells, ""),
         ("network over flow", *over, ""),
     ]
-    return "\n".join(
-        [
-            f"section {row['section']}, {1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g} mm, "
-            "cut out",
-            f"damage law of the network: {row['network_damage_law']}",
-            *(f"{one[0]:<20}{one[1]:>14}{one[2]:>14}{one[3]:>10}".rstrip() for one in lines),
-        ]
-    )
+    slab = f"{1e3 * row['x_lo_m']:g} to {1e3 * row['x_hi_m']:g} mm"
+    head = f"section {row['section']}, {slab}, cut out"
+    law = f"damage law of the network: {row['network_damage_law']}"
+    table = (f"{one[0]:<20}{one[1]:>14}{one[2]:>14}{one[3]:>10}".rstrip() for one in lines)
+    return "\n".join([head, law, *table])

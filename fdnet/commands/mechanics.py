@@ -37,11 +37,10 @@ def _mechanics(options: argparse.Namespace) -> int:
     from fdnet.run.mechanics import measure_elastic, measure_triaxial, packed_case, write_mechanics
     from fdnet.run.records import RunOptions
 
-    given, pressure = options.confining_MPa, None
-    if given is not None:
-        if not 0 < given < 1e9:
-            raise CaseError(f"--confining-MPa: {given}, expected a stress above 0, in MPa")
-        pressure = given * 1e6
+    given = options.confining_MPa
+    pressure = None if given is None else 1e6 * given
+    if given is not None and not 0 < given < 1e9:
+        raise CaseError(f"--confining-MPa: {given}, expected a stress above 0, in MPa")
     if options.triaxial and given is None:
         raise CaseError("--triaxial: needs the stress on the sides; give --confining-MPa")
     if options.triaxial and not 0 < options.strain <= 0.3:

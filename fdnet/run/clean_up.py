@@ -8,14 +8,13 @@ import numpy as np
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import HISTORY, UPDATES, Cleaned, overlap_in, read_history, state_at
 from fdnet.dem.clean_up import CleanUpStage, Start, clean_up, fines_inside
-from fdnet.dem.invade_deck import DrivingFluid
 from fdnet.errors import explained
 from fdnet.run.dem_stages import invaded, invasion_record, is_done, packed_grains
 from fdnet.run.fluid import Mirrored, fluid_of, mirrored
 from fdnet.run.folder import START_OVER, check_files, digests_of
 from fdnet.run.progress import Progress
 from fdnet.run.records import Session, run_record
-from fdnet.scales.scales import BackFlow, back_flow
+from fdnet.scales.scales import back_flow
 from fdnet.spheres.snapshot import Array, Snapshot
 
 if TYPE_CHECKING:
@@ -28,11 +27,8 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     """Turn the flow back, unless that is done. Raises what `clean_up` raises."""
     if is_done(session, STAGE):
         return
-    grains, flow, folder = (
-        packed_grains(session.path, session.case),
-        back_flow(case),
-        session.path / STAGE,
-    )
+    folder, flow = session.path / STAGE, back_flow(case)
+    grains = packed_grains(session.path, case)
     start = Start(
         grains=grains,
         invaded=invaded(session, case, grains, invasion_record(session, case)).damaged,
@@ -41,8 +37,9 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
     )
     progress = Progress("clean_up", flow.chunks * flow.scales.checkpoint_steps, show=False)
     with session.timed(STAGE), progress:
-        launch, fluid = session.launch(progress), fluid_turned_back(flow, grains)
-        result = clean_up(flow, start, folder, launch, fluid=fluid)
+        ahead = fluid_of(flow.case, flow.scales, mirrored(grains))
+        fluid = None if ahead is None else Mirrored(fluid=ahead)
+        result = clean_up(flow, start, folder, session.launch(progress), fluid=fluid)
     known, last = set(session.scales.warnings), result.history[-1]
     doubts = [f"clean-up: {explained(text)}" for text in flow.scales.warnings if text not in known]
     dumps = (f"post/clean_{row.step}.dump" for row in result.history)
@@ -61,12 +58,6 @@ def clean_up_stage(session: Session, case: InvasionCase) -> None:
         "left_out": [str(item) for item in result.left_out],
     }
     session.finish(STAGE, record)
-
-
-def fluid_turned_back(flow: BackFlow, grains: Snapshot) -> DrivingFluid | None:
-    """The fluid of a coupled clean-up, turned back."""
-    fluid = fluid_of(flow.case, flow.scales, mirrored(grains))
-    return None if fluid is None else Mirrored(fluid=fluid)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

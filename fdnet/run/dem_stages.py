@@ -50,11 +50,8 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     """Drive the fines in, unless that is done. Raises what `invade` raises."""
     if is_done(session, "invade"):
         return
-    scales, grains, folder = (
-        invasion_scales(case),
-        packed_grains(session.path, session.case),
-        session.path / "invade",
-    )
+    scales, grains = invasion_scales(case), packed_grains(session.path, case)
+    folder = session.path / "invade"
     if case.by_classes:
         with session.timed("invade"):
             model = class_model(case, scales, grains)

@@ -177,8 +177,7 @@ class FinishedRun:
         fines appeared to raise the permeability (`all_spheres_above_grains` in `network_counts` is
         1), `k_damaged_m2` is the permeability of the grains, and this network has a little more.
 
-        See `fdnet.report.tables.to_openpnm`; the viscosity is that of the case's fluid. Raises
-        CaseError where OpenPNM is not installed.
+        The viscosity is that of the case. Raises CaseError where OpenPNM is not installed.
         """
         analysis, spheres = self.case.analysis, self.spheres(state)
         if state == "initial" or self.summary.get("damage_law_used") == ALL_SPHERES:
@@ -227,10 +226,7 @@ def open_run(path: str | Path) -> FinishedRun:
         path: the run folder, for example "runs/quick".
 
     Returns:
-        The run, with `summary` (mapping) and its numbers as attributes (`k_damaged_mD`), `plot()`,
-        `sections`, `profile`, `pores`, `throats` and `history` (pandas, units in the column names,
-        SI), `spheres()`, `network()` and `to_openpnm()`. It prints itself in mD and m2, mm and
-        percent.
+        The run: its `summary` (mapping), tables (pandas, SI) and spheres (m); see `FinishedRun`.
 
     Raises:
         CaseError: there is no folder, it holds no run or an unfinished one, or its records cannot

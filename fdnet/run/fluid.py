@@ -215,12 +215,10 @@ STANDING = 0.5
 class NetworkFluid:
     """The fluid in a pack whose pores the fines fill."""
 
-    case: InvasionCase  # what is run
-    scales: InvasionScales  # of the case
+    case: InvasionCase
+    scales: InvasionScales
     grains: Snapshot  # of the pack, fixed
-    # share of the velocity given below which a fine belongs to the deposit
     standing: float = STANDING
-    # share of the deposit that may change before the network is solved anew
     renewed: float = RENEWED
 
     @property

@@ -76,6 +76,12 @@ def digests_of(folder: Path, names: Iterable[str]) -> dict[str, str]:
     return {name: file_digest(folder / name) for name in names if (folder / name).is_file()}
 
 
+def digests_of_results(folder: Path) -> dict[str, str]:
+    """Those of all that an opened run reads, as the manifest has them."""
+    frames = frames_in(folder).values()
+    return digests_of(folder, [*TABLES, *SOME_TABLES, *MESHES, *frames, *RECORDS.values()])
+
+
 def check_files(
     folder: Path,
     record: Mapping[str, Any],

@@ -253,7 +253,6 @@ class Renewal:
     """What a damaged pack carries; its network is solved when enough of the deposit changed."""
 
     pack: PackFlow  # the intact pack
-    # share of the deposit that may change before the network is solved anew
     renewed: float = RENEWED
     solved: Snapshot | None = None  # the fines of the last solve; None before the first
     sections: KeptSections | None = None  # of the throats, as they were at the last solve

@@ -39,15 +39,11 @@ from fdnet.run.dem_stages import (
 )
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import (
-    MESHES,
     RECORDS,
-    SOME_TABLES,
     START_OVER,
-    TABLES,
     check_files,
     check_finished,
-    digests_of,
-    frames_in,
+    digests_of_results,
     open_folder,
     read_manifest,
 )
@@ -144,8 +140,8 @@ def run_case(
     )
     if run_stages(given, options).get("stop_reason") != "unfinished":
         return open_run(options.out)
-    files = digests_of(options.out, [*TABLES, *SOME_TABLES, *MESHES])
-    return FinishedRun(path=options.out, case=given, manifest={"files": files, "invade": {}})
+    manifest = {"files": digests_of_results(options.out), "invade": {}}
+    return FinishedRun(path=options.out, case=given, manifest=manifest)
 
 
 def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
@@ -165,8 +161,7 @@ def run_stages(case: Case, options: RunOptions) -> dict[str, Any]:
         session = Session(case=case, scales=scales_of(case), folder=folder, options=options)
         if read_manifest(folder.path) is not None and folder.holds(case, options.stages):
             check_finished(folder.path)
-            path = folder.path / "summary.json"
-            return tables.read_summary(path) if path.exists() else {}
+            return tables.read_summary(folder.path / "summary.json")
         return _carry_out(session)
     except CaseError as error:
         left = folder.discard()
@@ -186,34 +181,39 @@ def refuse(case: Case, options: RunOptions) -> None:
         )
     needed = [
         stage
-        for stage in LIGGGHTS_STAGES
+        for stage in by_liggghts(case)
         if stage in options.stages
-        and stage in case.stages
         and not (stage == "pack" and options.pack_from is not None)
-        and (options.force or not (options.out / stage / "stage.json").exists())
+        and (options.force or not (options.out / RECORDS[stage]).exists())
     ]
     fresh = options.force or not read_rows(options.out / "invade")
-    for refusal in refusals(
-        case, scales_of(case), needed=needed, stages=options.stages, supply=fresh
-    ):
-        raise CaseError(refusal)
+    for one in refusals(case, scales_of(case), needed=needed, stages=options.stages, supply=fresh):
+        raise CaseError(one)
     if needed:
         find_binary(options.liggghts, launcher=options.launcher)
+
+
+def by_liggghts(case: Case) -> tuple[str, ...]:
+    """The stages of a case that LIGGGHTS carries out."""
+    fast = isinstance(case, InvasionCase) and case.by_classes
+    stages = LIGGGHTS_STAGES[: 1 if fast else None]
+    return tuple(stage for stage in stages if stage in case.stages)
 
 
 def refusals(
     case: Case,
     scales: Scales,
     *,
-    needed: Sequence[str] = LIGGGHTS_STAGES,
+    needed: Sequence[str] | None = None,
     stages: Sequence[str] = STAGES,
     supply: bool = True,
 ) -> Iterator[str]:
     """Why a case that can be read is not run, one sentence each: what `fdnet check` says too.
 
-    `needed` are the stages that will run LIGGGHTS, `stages` all that are asked for; `supply` says
-    whether the fines are still to be placed.
+    `needed` are the stages that will run LIGGGHTS (all of the case), `stages` all that are asked
+    for; `supply` says whether the fines are still to be placed.
     """
+    needed = by_liggghts(case) if needed is None else needed
     count = grain_count(case)
     if count < 4 and {"analyse", "report"} & set(stages):
         yield (
@@ -221,15 +221,12 @@ def refusals(
             "grains.count or enlarge the box"
         )
     yield from _refused(refuse_unreachable, case)
-    spheres = not (isinstance(case, InvasionCase) and case.by_classes)
-    if text := over_limit(
-        case, scales, pack="pack" in needed, invade="invade" in needed and spheres
-    ):
+    if text := over_limit(case, scales, pack="pack" in needed, invade="invade" in needed):
         yield text
     if isinstance(case, InvasionCase) and isinstance(scales, InvasionScales):
         if "clean_up" in case.stages:
             yield from _refused(back_flow, case)
-        if "invade" in needed and supply and spheres:
+        if "invade" in needed and supply:
             yield from _refused(refuse_crowded_supply, case, scales)
 
 
@@ -277,9 +274,8 @@ def _carry_out(session: Session) -> dict[str, Any]:
 
 
 def _manifest(session: Session, records: Records, summary: Mapping[str, Any]) -> dict[str, Any]:
-    case, folder = session.case, session.path
+    case = session.case
     done = [stage for stage in STAGES if stage in (*records, "analyse", "report")]
-    names = [*TABLES, *SOME_TABLES, *MESHES, *frames_in(folder).values(), *RECORDS.values()]
     return {
         "case": case.name,
         "digests": {stage: case.digest(stage) for stage in done if stage != "report"},
@@ -288,7 +284,7 @@ def _manifest(session: Session, records: Records, summary: Mapping[str, Any]) ->
         "command": session.options.command,
         "seconds": stage_costs(records, session)["seconds"],
         "versions": session.versions(),
-        "files": digests_of(folder, names),
+        "files": digests_of_results(session.path),
         **records,
     }
 

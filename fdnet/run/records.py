@@ -102,10 +102,7 @@ def finer_file(step: int) -> str:
 
 
 def _updates(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
-    """How often a fluid was computed anew, what its last update measured, and momentum.
-
-    Where the flow follows the deposit: how often momentum did not close, and by how much.
-    """
+    """How often a fluid was computed anew, its last update, and where momentum did not close."""
     if not rows:
         return {}
     result: dict[str, Any] = {"count": len(rows), "last": dict(rows[-1])}
@@ -275,21 +272,16 @@ class RunOptions:
                 f"timeout: {self.timeout}, expected a number of seconds above 0; leave it out for "
                 "no limit"
             )
-        if not 1 <= self.ranks <= most_ranks():
+        most = max(256, 64 * cores())  # more would only exhaust the machine
+        if not 1 <= self.ranks <= most:
             raise CaseError(
-                f"ranks: {self.ranks}, expected 1 to {most_ranks()} on the {cores()} cores of "
-                "this machine"
+                f"ranks: {self.ranks}, expected 1 to {most} on the {cores()} cores of this machine"
             )
 
 
 def cores() -> int:
     """Number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0))
-
-
-def most_ranks() -> int:
-    """Largest number of MPI ranks that is accepted: more would only exhaust the machine."""
-    return max(256, 64 * cores())
 
 
 @dataclass(slots=True)

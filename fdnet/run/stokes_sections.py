@@ -139,9 +139,7 @@ def stokes_sections(
         follow: takes a line on each grid before it is solved.
 
     Returns:
-        For each section its number, the fields of `StokesSection`, and by the network the
-        permeabilities (m2), the reduction, the damage law, and what the run took from resolved
-        flow.
+        For each section its number, the fields of `StokesSection`, and what `with_network` adds.
 
     Raises:
         CaseError: there is no such section, the side walls let the fluid slip, the grid would be

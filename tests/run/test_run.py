@@ -409,8 +409,8 @@ def test_a_full_disk_is_named_and_room_completes_the_run(whole, small_disk):
         "--json",
     ]
     full = fdnet(*command)
-    words = {3: "the disk is full", 2: "No space left on device; free space"}  # LIGGGHTS, or fdnet
-    assert words[full.returncode] in full.stderr
+    assert full.returncode in (2, 3)  # fdnet or LIGGGHTS met it first
+    assert "the disk is full" in full.stderr or "No space left on device" in full.stderr
     subprocess.run(["mount", "-o", "remount,size=50m", str(small_disk)], check=True)
     resumed = fdnet(*command, "--resume")
     assert resumed.returncode == 0, resumed.stderr
