@@ -17,8 +17,6 @@ ALL, SIDES, NONE = (True,) * 3, (False, True, True), (False,) * 3
 
 SC_SPACING = 2.0
 
-EDGE = 3 * SC_SPACING
-
 
 def measure(
     grains: Snapshot,
@@ -103,17 +101,6 @@ def test_slivers_of_every_thickness_leave_k_continuous():
             )
             void = moved.network.pore_volume.sum() / np.prod(np.ptp(pack.box, axis=1))
             assert void == pytest.approx(porosity, abs=1e-6 + 10 * size)
-
-
-def test_one_layer_is_the_lattice_its_mirror_images_make_up():
-    layer = simple_cubic()
-    one = layer.where(layer.position[:, 0] < SC_SPACING)
-    one = snapshot(
-        one.position + np.array([0.8, 0, 0]), 1.0, [[0, SC_SPACING], [0, EDGE], [0, EDGE]]
-    )
-    assert measure(one).k_initial == pytest.approx(
-        measure(layer, periodic=ALL).k_initial, rel=1e-6
-    )
 
 
 def test_a_box_thinner_than_a_grain_between_planes_of_symmetry_is_the_lattice():
