@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -173,9 +174,10 @@ def test_a_permeability_above_that_of_the_empty_duct_is_said_with_its_number():
     assert square == pytest.approx(0.035144 * 4, rel=1e-4)
     assert empty_duct_permeability(box, (False, True, False)) == pytest.approx(4 / 12)
     assert empty_duct_permeability(box, (False, True, True)) == np.inf
-    given = {"porosity": 0.4, "box": box, "periodic": (False,) * 3}
-    said = list(doubts(permeability=2 * square, walls="no-slip", **given))
+    duct = SimpleNamespace(box=box, periodic=(False,) * 3, walls="no-slip")
+    said = list(doubts(0.4, 2 * square, duct))
     assert len(said) == 1
     assert f"{square:.3g} m2, which is impossible" in said[0]
-    assert not list(doubts(permeability=0.5 * square, walls="no-slip", **given))
-    assert not list(doubts(permeability=2 * square, walls="slip", **given))
+    assert not list(doubts(0.4, 0.5 * square, duct))
+    duct.walls = "slip"
+    assert not list(doubts(0.4, 2 * square, duct))

@@ -79,18 +79,14 @@ if not config.CACHE_DIR:  # type: ignore[attr-defined]
     _SHARED = cache_folder(_PACKAGE, _writable_root())
     config.CACHE_DIR = str(_SHARED)  # type: ignore[attr-defined]
 
-_COLD = _SHARED is not None and not any(_SHARED.rglob("*.nbi"))
+COLD = _SHARED is not None and not any(_SHARED.rglob("*.nbi"))
+"""Whether this version had compiled nothing when the process began."""
 _said: set[str] = set()
-
-
-def is_cold() -> bool:
-    """Whether this version had compiled nothing when the process began."""
-    return _COLD
 
 
 def say_compiling() -> None:
     """Say once why the first analysis of a version takes longer."""
-    if _COLD and "compiling" not in _said:
+    if COLD and "compiling" not in _said:
         _said.add("compiling")
         print("fdnet: compiling, once for this version, about 40 s", file=sys.stderr, flush=True)
 
@@ -187,17 +183,12 @@ def compiled_for_loops(function: Any) -> Any:
     return compiled(function, **_LOOPS)
 
 
-def compiled_in_place(function: Any) -> Any:
-    """`compiled` for a function that writes into the arrays that it is given.
+def loops_in_place(function: Any) -> Any:
+    """`compiled_for_loops` for a function that writes into the arrays that it is given.
 
     It may neither make an array nor return one. Then nobody has to count who still holds which
     array, which numba otherwise does for each array of a tuple at each call (numba issue 2345).
     """
-    return compiled(function, _nrt=False)
-
-
-def loops_in_place(function: Any) -> Any:
-    """`compiled_for_loops` for a function that may do what `compiled_in_place` says."""
     return compiled(function, **_LOOPS, _nrt=False)
 
 

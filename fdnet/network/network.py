@@ -160,7 +160,7 @@ def build_network(
     half, fourth or eighth of the periodic specimen that its mirror images make up; with "no-slip"
     the y and z faces also hold the fluid, for the laws that account for it (`lubrication`).
     Unequal grains are tessellated by their power tessellation. Grains that do not reach into the
-    box are left out and counted (`counts`), as are those that lie wholly inside another one.
+    box or lie wholly inside another one are left out and counted (`counts`).
 
     Args:
         grains: the spheres that carry the skeleton, m; those of the kind fine are taken as grains
@@ -219,7 +219,6 @@ def build_network(
         **throats,
     )
     for field in fields(network):
-        value = getattr(network, field.name)
-        if isinstance(value, np.ndarray):
+        if isinstance(value := getattr(network, field.name), np.ndarray):
             value.setflags(write=False)
     return network

@@ -27,17 +27,13 @@ ON_FACET = 1e-9
 
 
 class Nodes(NamedTuple):
-    """The nodes of the pores (P) of a network, above the facets of its throats (T).
-
-    Attributes:
-        position: (P, 3) m.
-        heights: (T, 2) m, distances of the nodes of both pores from the facet of a throat. They
-            are positive on the pore's own side of it. Only pores of a polyhedron with several
-            tetrahedra can have a negative one.
-    """
+    """The nodes of the pores (P) of a network, above the facets of its throats (T)."""
 
     position: Array
+    """(P, 3) m."""
     heights: Array
+    """(T, 2) m, distances of the nodes of both pores from the facet of a throat, positive on the
+    pore's own side. Only pores of a polyhedron with several tetrahedra can have a negative one."""
 
 
 def nodes_of(network: Network) -> Nodes:

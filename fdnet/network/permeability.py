@@ -18,11 +18,8 @@ from fdnet.network.flow.sections import (
     Layers,
     Profile,
     Section,
-    inplace_permeability,
-    layer_edges,
     make_profile,
     make_sections,
-    plane_pressures,
     reduction,
     thin_slabs,
 )
@@ -36,7 +33,7 @@ from fdnet.network.specimen import (
     pack_doubts,
     specimen_doubts,
 )
-from fdnet.network.states import Log, Measured, State, at_most_the_grains, few_throats
+from fdnet.network.states import Log, Measured, at_most_the_grains, few_throats, make_layers
 from fdnet.spheres.snapshot import Array, Directions, Snapshot, frozen, sides_of
 
 if TYPE_CHECKING:
@@ -49,15 +46,16 @@ class Analysis(Invaded):
 
     P pores, T throats. "Damaged" is with the fines; without fines it equals "initial". When the
     grains moved, `network` and every value by pore or throat are of their final positions, while
-    `k_initial` and the initial values of the sections are of their first positions.
+    `k_initial` and the initial values of the sections are of their first positions. What invaded
+    is `invaded_count`, `invaded_volume`, `invasion_depth`, `invasion_depth_p95` and
+    `cake_thickness` of `Invaded`.
 
     Attributes:
         network: pores and throats of the grains.
         occupancy: what the fines fill of each pore and throat; None without fines.
         law: name of the conductance law.
         damage_law: name of the damage law that was asked for.
-        damage_law_used: the one that `k_damaged` and the sections are from, where "auto" was asked
-            for the one that it took; None without fines.
+        damage_law_used: the one that `k_damaged` and the sections are from; None without fines.
         damage_law_other: name of the second damage law, of the network of the grains, where it
             was computed as well; else None. Values by pore and throat are then by it.
         k_damaged_other: permeability with fines by that law, m2; else None. The difference to
@@ -81,8 +79,8 @@ class Analysis(Invaded):
         layers: permeability and pressure drop of thin layers of the first millimetre; None unless
             the network of all spheres was solved.
         solver: method, residual and mass balance, the worst of all solves.
-        copies: how often a periodic cell of a few grains was repeated along x, y and z, so that it
-            can be tessellated. The network and the values by pore and throat are of all copies.
+        copies: how often a periodic cell of a few grains was repeated along x, y and z; the
+            network and the values by pore and throat are of all copies.
         counts: how many pores, throats and spheres were closed, replaced or left out, by reason.
         warnings: doubts about the result, in words.
         seconds: run time of each step of the analysis, s.
@@ -169,17 +167,15 @@ def analyse(
         damaged: the same grains, moved or not, and all fines. Without it, `spheres` holds the
             fines, or there are none.
         periodic: sides that repeat: letters such as "yz", three truth values (x, y, z), or one
-            for all. The other sides of the box are walls; along the flow they are the inlet and
-            the outlet. Without it, the sides that the spheres know, as those of a dump do, else
-            walls.
+            for all; without it those that the spheres know. The other sides of the box are walls;
+            along the flow they are the inlet and the outlet.
         axis: direction of the flow, "x", "y" or "z". The result has it as its x, as
             `Snapshot.turned` does.
         options: choices of the analysis, for example `case.analysis`. Without it: one section,
             profile bins of a mean grain radius, fdnet's default laws.
         choices: single choices by name, in place of those of `options`: `sections` (a count, or
             edges in m), `law`, `damage_law`, `clogging_threshold`, `middle_band`,
-            `throat_overlap`, `profile_bin_mm`, `walls`. The defaults shown are those that hold
-            without `options`.
+            `throat_overlap`, `profile_bin_mm`, `walls`.
 
     Returns:
         Permeabilities (m2), porosities, sections, profile, network and flows. No open path is no
@@ -187,14 +183,12 @@ def analyse(
         also a warning of Python's: the unit of length is probably another one.
 
     Raises:
-        CaseError: a choice is unknown or outside its range (the message names its key), or
-            `spheres` are neither a Snapshot nor arrays.
+        CaseError: a choice is unknown or outside its range, or `spheres` cannot be used.
         NetworkError: the geometry is degenerate, or the grains of the two snapshots differ.
         FlowError: the solve fails its checks.
 
     Examples:
-        A simple cubic lattice of touching spheres, diameter 1 mm (k = 0.00252 d^2, Zick and Homsy
-        1982):
+        Touching spheres of 1 mm on a simple cubic lattice (k = 0.00252 d^2, Zick and Homsy 1982):
 
         >>> import fdnet, numpy as np
         >>> lattice = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
@@ -203,11 +197,6 @@ def analyse(
         >>> print(f"{result.k_initial:.2g} m2, porosity {result.porosity_initial:.3f}")
         2.5e-09 m2, porosity 0.476
 
-        Flow along y, from plain arrays:
-
-        >>> turned = fdnet.analyse((lattice, 0.5e-3, [3e-3] * 3), periodic=True, axis="y")
-        >>> print(f"{turned.k_initial:.2g} m2")
-        2.5e-09 m2
     """
     chosen = _chosen(options, choices)
     pair = (chosen.law, chosen.damage_law)
@@ -395,8 +384,6 @@ def permeability(
         >>> result = fdnet.permeability(points, 0.5, [3, 3, 3])
         >>> print(f"{result.k_m2:.3g} m2, {result.k_mD:.0f} mD, porosity {result.porosity:.3f}")
         2.52e-09 m2, 2551691 mD, porosity 0.476
-        >>> fdnet.permeability(points, 0.5, [3, 3, 3], axis="all").to_frame().axis.tolist()
-        ['x', 'y', 'z']
     """
     if box is None:
         raise CaseError(f"box: missing, expected its three lengths, {units}")
@@ -482,8 +469,7 @@ def _analysis(measured: Measured, options: AnalysisChoices) -> Analysis:
         k, slabs, flow = whole.k, whole.slabs, whole.flow
         log.warnings += laws_apart((ALL_SPHERES, k), (of_grains, final.k))
         if fines is not None and clean.halves is not None:
-            edges = layer_edges(clean.network.box, 2.0 * float(fines.radius.mean()))
-            layers = _layers(clean, whole, edges, specimen.depth)
+            layers = make_layers(clean, whole, 2.0 * float(fines.radius.mean()), specimen.depth)
     elif final is not clean:
         final = measured.with_fines_slabs(final, options, of_grains)
         k, slabs = final.k, final.slabs
@@ -492,7 +478,7 @@ def _analysis(measured: Measured, options: AnalysisChoices) -> Analysis:
         if one.reason:
             log.warnings.append(Doubt("no-open-path", f"{which} = 0: {one.reason}"))
     log.warnings += thin_slabs(sections, 2.0 * clean.network.grain_radius)
-    log.warnings += specimen_doubts(specimen, clean.k, options.walls)
+    log.warnings += specimen_doubts(specimen, clean.k)
     law_used = np.full(len(final.conductance), CLEAN) if damage is None else damage.law_used
     flows = [clean.flow, base.flow, final.flow, flow, *clean.slabs.flows, *slabs.flows]
     balances = [one.mass_balance for one in flows if one.mass_balance is not None]
@@ -531,25 +517,4 @@ def _analysis(measured: Measured, options: AnalysisChoices) -> Analysis:
         counts=counts,
         warnings=tuple(log.warnings),
         seconds=log.seconds,
-    )
-
-
-def _layers(initial: State, damaged: State, edges: Array, depth: Array) -> Layers:
-    """Layers between `edges` (B+1,) m of a specimen before and after; `depth` (F,) m of fines."""
-
-    def drop(state: State) -> Array:
-        if not state.flow.inflow:
-            return frozen(np.full(len(edges) - 1, np.nan))
-        return frozen(-np.diff(plane_pressures(state.network, state.flow, edges, state.halves)))
-
-    def k(state: State) -> Array:
-        return frozen(inplace_permeability(state.network, state.flow, edges, state.halves))
-
-    return Layers(
-        edges=frozen(edges),
-        k_initial=k(initial),
-        k_damaged=k(damaged),
-        drop_initial=drop(initial),
-        drop_damaged=drop(damaged),
-        fines_count=frozen(np.histogram(depth, edges)[0]),
     )

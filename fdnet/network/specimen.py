@@ -38,21 +38,18 @@ theirs, 3 contacts give 5 and 19 % less, for small fines lie caged between other
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Invaded:
-    """Fines centred in the box, and the cake. The formation face is the low x face, x = 0.
-
-    Attributes:
-        invaded_count: number of fines centred in the specimen.
-        invaded_volume: their volume, m3, of whole spheres.
-        invasion_depth: depth of the deepest of them, m; 0 without fines.
-        invasion_depth_p95: depth above which 95 % of them lie, m; 0 without fines.
-        cake_thickness: thickness of the cake upstream of the formation face, m.
-    """
+    """Fines centred in the box, and the cake. The formation face is the low x face, x = 0."""
 
     invaded_count: int
+    """Number of fines centred in the specimen."""
     invaded_volume: float
+    """Their volume, m3, of whole spheres."""
     invasion_depth: float
+    """Depth of the deepest of them, m; 0 without fines."""
     invasion_depth_p95: float
+    """Depth above which 95 % of them lie, m; 0 without fines."""
     cake_thickness: float
+    """Thickness of the cake upstream of the formation face, m."""
 
 
 def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
@@ -181,14 +178,7 @@ def _crossing(spheres: Snapshot, periodic: tuple[bool, bool, bool], axis: str) -
         )
 
 
-def doubts(
-    *,
-    porosity: float,
-    permeability: float,
-    box: Array,
-    periodic: tuple[bool, bool, bool],
-    walls: str,
-) -> Iterator[str]:
+def doubts(porosity: float, permeability: float, network: Network) -> Iterator[str]:
     """Why the permeability (m2) of a pack without fines is to be doubted, one sentence each."""
     low, high = VALIDATED_POROSITY
     if not low <= porosity <= high:
@@ -198,8 +188,8 @@ def doubts(
             "where fdnet was compared with resolved flow: the permeability may be wrong by more "
             "than the documented error; check the box and the units, or use a resolved solver",
         )
-    empty = empty_duct_permeability(box, periodic) if walls == "no-slip" else np.inf
-    if permeability > empty:
+    empty = empty_duct_permeability(network.box, network.periodic)
+    if network.walls == "no-slip" and permeability > empty:
         yield Doubt(
             "impossible-permeability",
             f"the permeability without fines, {permeability:.3g} m2, is above that of the empty "
@@ -214,13 +204,11 @@ def kozeny(grains: Snapshot, porosity: float) -> float:
     return porosity**3 * sauter**2 / (180.0 * max(1.0 - porosity, 1e-9) ** 2)
 
 
-def _walls_at_periodic_sides(
-    grains: Snapshot, periodic: tuple[bool, bool, bool]
-) -> Iterator[tuple[str, int, float]]:
-    """Periodic axes along which the pack ends as at a wall.
+def _walls_at_periodic_sides(grains: Snapshot, periodic: tuple[bool, bool, bool]) -> Iterator[str]:
+    """A warning for each periodic axis along which the pack ends as at a wall.
 
-    No grain crosses their sides, and far fewer neighbours meet across them than across any plane
-    within. Yields the axis, the number of these neighbours and the number expected.
+    No grain crosses its sides, and far fewer neighbours meet across them than across any plane
+    within.
     """
     place = wrapped(grains.position, grains.box, periodic)
     reach, (low, high) = grains.radius[:, None] * (1.0 - PRESSED), grains.box.T
@@ -239,7 +227,14 @@ def _walls_at_periodic_sides(
         meeting = int(np.sum(np.abs(apart[:, axis]) > 0.5 * size[axis]))
         wide = size[axis] > LEAST_SIDE * inside.max(initial=0.0)
         if wide and expected >= FEWEST and meeting < MISSING * expected:
-            yield "xyz"[axis], meeting, expected
+            name = "xyz"[axis]
+            yield Doubt(
+                "walls-at-periodic-sides",
+                f"no grain crosses the periodic sides {name}, and {meeting} neighbours meet "
+                f"across them where {expected:.0f} are expected: the pack stands as between "
+                f"walls, and the gap there carries flow; leave {name} out of the periodic "
+                "directions unless the pack repeats like this",
+            )
 
 
 def empty_duct_permeability(box: Array, periodic: tuple[bool, bool, bool]) -> float:
@@ -272,40 +267,38 @@ class Specimen:
     """The parts of an analysis that depend on no law, in SI units.
 
     A periodic cell of a few grains is repeated for its networks; everything else is of the cell.
-
-    Attributes:
-        grains: the grains as they were, and where they ended; those of all copies.
-        fines: all fines, those beyond the box among them; None without fines.
-        copies: of the cell along x, y and z.
-        inner_grains: number of grains wholly inside other spheres; they were left out.
-        inner_fines: number of fines likewise.
-        first: network of the grains as they were.
-        network: network of the grains where they ended, the same one unless they moved.
-        moved: whether any grain moved by more than 1 nm.
-        occupancy: what the fines fill of `network`; None without fines.
-        edges: (S+1,) edges of the sections, m.
-        bins: (B+1,) edges of the profile's bins, m.
-        porosity: porosity before and after, by depth.
-        depth: (F,) depth of the fines centred in the box, m.
-        invaded: number, volume and depths of these fines, and the cake.
-        outside_sides: number of fines centred beyond a side wall.
     """
 
     grains: tuple[Snapshot, Snapshot]
+    """The grains as they were, and where they ended; those of all copies."""
     fines: Snapshot | None
+    """All fines, those beyond the box among them; None without fines."""
     copies: tuple[int, int, int]
+    """Of the cell along x, y and z."""
     inner_grains: int
+    """Number of grains wholly inside other spheres; they were left out."""
     inner_fines: int
+    """Number of fines likewise."""
     first: Network
+    """Network of the grains as they were."""
     network: Network
+    """Network of the grains where they ended, the same one unless they moved."""
     moved: bool
+    """Whether any grain moved by more than 1 nm."""
     occupancy: Occupancy | None
+    """What the fines fill of `network`; None without fines."""
     edges: Array
+    """(S+1,) edges of the sections, m."""
     bins: Array
+    """(B+1,) edges of the profile's bins, m."""
     porosity: tuple[Porosity, Porosity]
+    """Porosity before and after, by depth."""
     depth: Array
+    """(F,) depth of the fines centred in the box, m."""
     invaded: Invaded
+    """Number, volume and depths of these fines, and the cake."""
     outside_sides: int
+    """Number of fines centred beyond a side wall."""
 
     __repr__ = one_line
 
@@ -408,7 +401,7 @@ def as_snapshot(spheres: object, name: str = "spheres") -> Snapshot:
     )
 
 
-def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iterator[str]:
+def specimen_doubts(specimen: Specimen, permeability: float) -> Iterator[str]:
     """Warnings on a specimen and its permeability without fines, m2."""
     network, occupancy = specimen.first, specimen.occupancy
     if count := network.counts["grains_outside_box"]:
@@ -437,13 +430,7 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
                 "and were left out",
             )
     porosity = specimen.porosity[0].mean
-    yield from doubts(
-        porosity=porosity,
-        permeability=permeability,
-        box=network.box,
-        periodic=network.periodic,
-        walls=walls,
-    )
+    yield from doubts(porosity, permeability, network)
     least, most = 2.0 * float(grains.radius.min()), 2.0 * float(grains.radius.max())
     if most > SAND[1] or least < SAND[0]:
         yield Doubt(
@@ -466,14 +453,7 @@ def specimen_doubts(specimen: Specimen, permeability: float, walls: str) -> Iter
             f"this porosity ({likely:.3g} m2), which no packing has: do not use it; check the "
             "box, which sides are periodic, and whether radii and places have one unit",
         )
-    for axis, pairs, expected in _walls_at_periodic_sides(grains, network.periodic):
-        yield Doubt(
-            "walls-at-periodic-sides",
-            f"no grain crosses the periodic sides {axis}, and {pairs} neighbours meet across them "
-            f"where {expected:.0f} are expected: the pack stands as between walls, and the gap "
-            f"there carries flow; leave {axis} out of the periodic directions unless the pack "
-            "repeats like this",
-        )
+    yield from _walls_at_periodic_sides(grains, network.periodic)
     if specimen.outside_sides:
         yield Doubt(
             "fines-beyond-the-sides",

@@ -1,11 +1,10 @@
 """States of a specimen: its network, flow and sections, without fines and with them.
 
 A slab across the flow is a specimen of its own: what its two planes cut out of the spheres. The
-planes are inlet and outlet: the pressure is held on them, and the fluid crosses them at right
-angles. So the slab with its mirror image is a periodic pack, and its network is that of the
-spheres in a box of this length (`tessellation.place_grains`). Cutting the throats of the whole
-specimen at the planes instead leaves stumps of oblique throats, and misses that a pore which a
-plane cuts is open to it.
+pressure is held on the planes, and the fluid crosses them at right angles. So the slab with its
+mirror image is a periodic pack, and its network is that of the spheres in a box of this length
+(`tessellation.place_grains`). Cutting the throats of the whole specimen at the planes instead
+leaves stumps of oblique throats, and misses that a pore which a plane cuts is open to it.
 """
 
 import time
@@ -24,8 +23,11 @@ from fdnet.network.compiled import on_all_cores
 from fdnet.network.fines.occupancy import measure_occupancy
 from fdnet.network.flow.flow import Flow
 from fdnet.network.flow.sections import (
+    Layers,
     SlabK,
     inplace_permeability,
+    layer_edges,
+    plane_pressures,
     slab_permeability,
     whole_permeability,
 )
@@ -124,26 +126,23 @@ NO_SLABS = SlabK(cut_out=frozen([]), inplace=frozen([]), flows=())
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class State:
-    """A network with the conductance of its throats, its flow and its permeability.
-
-    Attributes:
-        network: pores and throats.
-        conductance: (T,) m3.
-        flow: through the box.
-        k: m2, of the whole specimen.
-        halves: (T, 2) 1/m3, resistances of the two halves of the throats, by which the pressure
-            falls along them; None for laws that have none.
-        slabs: permeability of the sections, cut out and in place; of none where nobody asked.
-        refused: sections whose spheres make no network of their own, one sentence each.
-    """
+    """A network with the conductance of its throats, its flow and its permeability."""
 
     network: Network
+    """Pores and throats."""
     conductance: Array
+    """(T,) m3."""
     flow: Flow
+    """Through the box."""
     k: float
+    """m2, of the whole specimen."""
     halves: Array | None
+    """(T, 2) 1/m3, resistances of the two halves of the throats, by which the pressure falls along
+    them; None for laws that have none."""
     slabs: SlabK = NO_SLABS
+    """Permeability of the sections, cut out and in place; of none where nobody asked."""
     refused: tuple[str, ...] = ()
+    """Sections whose spheres make no network of their own, one sentence each."""
 
     __repr__ = one_line
 
@@ -197,9 +196,8 @@ def with_slabs(state: State, edges: Array, cut: Cut | None, conduct: Conduct, lo
 # The damaged permeability from the network of all spheres, grains and fines alike.
 #
 # The power tessellation of grains and fines gives pores and throats at the scale of the fines, and
-# the law `lubrication` gives their conductance, narrowed where no sphere of a facet reaches a
-# section. No damage law is needed. Fines centred upstream whose bodies reach into the specimen
-# count with what they have inside, as grains do.
+# the law `lubrication` their conductance, narrowed where no sphere of a facet reaches a section.
+# No damage law is needed. Of fines centred upstream counts what they have inside, as of grains.
 
 
 def all_conductances(network: Network) -> Array:
@@ -241,15 +239,11 @@ def at_most_the_grains(
 ) -> tuple[State, dict[str, int]]:
     """The permeabilities with fines, at most those of the grains, and how many were above.
 
-    Fines never raise the permeability. Where few of them make the network finer, its k may be
-    above that of the grains by the difference of two errors; it is then set to that of the grains.
-
-    Args:
-        whole: the network of all spheres, with its slabs.
-        k_grains: m2, of the grains where they ended.
-        grains: of their sections; None where the invasion moved the grains.
-        edges: (S+1,) m, of the sections.
-        empty: (S,) whether no fine reaches into a section.
+    Fines never raise the permeability. Where few of them make the network finer, the k of the
+    network `whole` of all spheres may be above that of the grains by the difference of two errors;
+    it is then set to that of the grains where they ended, `k_grains` m2. `grains` are their
+    sections, between `edges` (S+1,) m; None where the invasion moved them. No fine reaches into
+    the `empty` (S,) ones.
     """
     k, slabs, network = whole.k, whole.slabs, whole.network
     above, sections_above = int(k > k_grains), 0
@@ -271,6 +265,28 @@ def at_most_the_grains(
         "all_spheres_sections_above_grains": sections_above,
     }
     return replace(whole, k=min(k, k_grains), slabs=slabs), counts
+
+
+def make_layers(initial: State, damaged: State, thickness: float, depth: Array) -> Layers:
+    """Layers of `thickness` m of a specimen before and after; `depth` (F,) m of its fines."""
+    edges = layer_edges(initial.network.box, thickness)
+
+    def drop(state: State) -> Array:
+        if not state.flow.inflow:
+            return frozen(np.full(len(edges) - 1, np.nan))
+        return frozen(-np.diff(plane_pressures(state.network, state.flow, edges, state.halves)))
+
+    def k(state: State) -> Array:
+        return frozen(inplace_permeability(state.network, state.flow, edges, state.halves))
+
+    return Layers(
+        edges=frozen(edges),
+        k_initial=k(initial),
+        k_damaged=k(damaged),
+        drop_initial=drop(initial),
+        drop_damaged=drop(damaged),
+        fines_count=frozen(np.histogram(depth, edges)[0]),
+    )
 
 
 def few_throats(flows: Sequence[Flow]) -> Iterator[str]:

@@ -4,7 +4,6 @@ It is the reference of the pore network (`solve_stokes`, `solve_slab`) and, on c
 flow that `fdnet.network.field` interpolates. Method and checks: docs/theory/resolved_flow.md.
 """
 
-import logging
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -19,7 +18,6 @@ from fdnet.errors import CaseError, FlowError, NetworkError
 from fdnet.network.compiled import compiled, loops_in_place
 from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line
 
-PROGRESS = logging.getLogger(__name__)
 FEWEST_CELLS = 4
 WHOLE_CELLS = 1e-6
 """Part of the longest edge by which an edge may miss a whole number of cubic cells."""
@@ -35,26 +33,24 @@ class Lattice:
     Node (i, j, k) of velocity component d lies at i along d and at j + 1/2, k + 1/2 along the
     others, in cells. Pressures are in the middle of the cells. Between two walls, node 0 of the
     component across them lies on the lower wall and carries no flow; there is none on the upper.
-
-    Attributes:
-        low: (3,) m, lower corner.
-        spacing: (3,) m, edges of a cell.
-        shape: cells along x, y and z.
-        walled: whether the sides across x (never), y and z are walls; else they are periodic.
-        specimen: lower and upper end of the specimen along x, m; the side walls hold the fluid
-            between them, and let it slip beyond.
-        repeats: whether the specimen itself fills the grid along x.
-        planes: whether the sides across x are planes of one pressure each, with no velocity along
-            them; component 0 has nodes on both of them.
     """
 
     low: Array
+    """(3,) m, lower corner."""
     spacing: Array
+    """(3,) m, edges of a cell."""
     shape: Shape
+    """Cells along x, y and z."""
     walled: Walled
+    """Whether the sides across x (never), y and z are walls; else they are periodic."""
     specimen: tuple[float, float]
+    """Lower and upper end of the specimen along x, m; the side walls hold the fluid between them,
+    and let it slip beyond."""
     repeats: bool
+    """Whether the specimen itself fills the grid along x."""
     planes: bool = False
+    """Whether the sides across x are planes of one pressure each, with no velocity along them;
+    component 0 has nodes on both of them."""
 
     __repr__ = one_line
 
@@ -76,18 +72,14 @@ class Lattice:
     @property
     def response(self) -> "Response":
         """The flow of forces on the grid."""
-        scale = self.unit / self.spacing
-        return Response(self.shape, self.walled, scale, planes=self.planes)
+        return Response(self)
 
 
 def divide(edges: Array, cells: int) -> Shape:
     """Cells along edges (3,) m, `cells` of them on the longest.
 
     Where another edge is no whole number of cubic cells, the cells are a little longer or shorter
-    along it, in a number whose Fourier transform is fast.
-
-    Raises:
-        CaseError: there are too few cells, or an edge is not positive.
+    along it, in a number whose Fourier transform is fast. Raises CaseError on too few cells.
     """
     if cells < FEWEST_CELLS or not np.all(edges > 0.0):
         raise CaseError(
@@ -115,16 +107,14 @@ def divide(edges: Array, cells: int) -> Shape:
 class Response:
     """The symbols of one grid: `nodes` is the shape of its arrays, `difference` the g_d (n,).
 
-    Sides and planes are those of `Lattice`, `scale` (3,) the edges of a cell along x over those
-    along each axis. Between planes the last row of an array is of component 0 alone, and on the
-    planes a number is a force or a velocity over the root of 2, since such a node stands for one
-    node of the mirrored cell and all others for two: so S stays symmetric.
+    Between planes the last row of an array is of component 0 alone, and on the planes a number is
+    a force or a velocity over the root of 2, since such a node stands for one node of the mirrored
+    cell and all others for two: so S stays symmetric.
     """
 
-    def __init__(
-        self, shape: Shape, walled: Walled, scale: Array, *, planes: bool = False
-    ) -> None:
-        self.shape, self.walled, self.scale, self.planes = shape, walled, scale, planes
+    def __init__(self, lattice: Lattice) -> None:
+        shape, walled, planes = lattice.shape, lattice.walled, lattice.planes
+        self.walled, self.planes, scale = walled, planes, lattice.unit / lattice.spacing
         self.nodes: Shape = (shape[0] + planes, *shape[1:])
         self.wrapping = tuple(d for d in range(3) if not (walled[d] or (d == 0 and planes)))
         self.between_walls = tuple(d for d in range(3) if walled[d])
@@ -230,21 +220,16 @@ LEAST_DRAG = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Walls:
-    """M nodes of one velocity component that carry a force.
-
-    Attributes:
-        node: (M,) flat index in an array of nodes.
-        slack: (M,) velocity per force: 0 where u = 0 is imposed, else 1 / drag.
-        owner: (M,) sphere that the force is on, or SIDE_WALL.
-        solid: array of nodes, true in the solid.
-    """
+    """M nodes of one velocity component that carry a force."""
 
     node: Array
+    """(M,) flat index in an array of nodes."""
     slack: Array
+    """(M,) velocity per force: 0 where u = 0 is imposed, else 1 / drag."""
     owner: Array
+    """(M,) sphere that the force is on, or SIDE_WALL."""
     solid: Array
-
-    __repr__ = one_line
+    """Array of nodes, true in the solid."""
 
 
 class Marks(NamedTuple):
@@ -447,8 +432,9 @@ class Problem:
         self.right[0] -= self.weight[0]
         if response.planes:
             self.right[0, [0, -1]] *= np.float32(sqrt(0.5))
-        self.drifting = [d for d in (1, 2) if not (response.planes or response.walled[d])]
         self.norms = [summed_product(part, part) for part in (self.right[0], *self.weight[1:])]
+        sideways = () if response.planes else (1, 2)
+        self.drifting = [d for d in sideways if self.norms[d] and not response.walled[d]]
 
     def apply(self, scaled: Array, room: Array) -> Array:
         """A times `scaled`, in an array `room` of its shape."""
@@ -469,9 +455,8 @@ class Problem:
     def project(self, scaled: Array) -> Array:
         """`scaled` without the part that carries a net force sideways, changed in place."""
         for d in self.drifting:
-            if self.norms[d]:
-                load, part = self.weight[d], scaled[d]
-                part -= load * np.float32(summed_product(load, part) / self.norms[d])
+            load, part = self.weight[d], scaled[d]
+            part -= load * np.float32(summed_product(load, part) / self.norms[d])
         return scaled
 
     def slip(self, square: float) -> float:
@@ -501,34 +486,27 @@ class Problem:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class GridFlow:
-    """A solved flow around N spheres with the superficial velocity U along x; viscosity mu.
-
-    Attributes:
-        lattice: the grid.
-        force: (3, n0, n1, n2) force on the fluid at each node over mu U, in units of the lattice
-            (spacing along x 1).
-        drift: (3,) mean velocity over U.
-        slip: rms velocity left at the walls over U.
-        iterations: of the conjugate gradients.
-        k: permeability m2.
-        walls: of the three velocity components.
-    """
+    """A solved flow around N spheres with the superficial velocity U along x; viscosity mu."""
 
     lattice: Lattice
+    """The grid."""
     force: Array
+    """(3, n0, n1, n2) force on the fluid at each node over mu U; spacing along x 1."""
     drift: Array
+    """(3,) mean velocity over U."""
     slip: float
+    """Rms velocity left at the walls over U."""
     iterations: int
+    """Of the conjugate gradients."""
     k: float
+    """Permeability m2."""
     walls: tuple[Walls, Walls, Walls]
+    """Of the three velocity components."""
 
     __repr__ = one_line
 
     def forces(self, count: int) -> tuple[Array, Array]:
-        """Force of the fluid on each of `count` spheres (N, 3) and on the side walls (3,).
-
-        They are over mu U, in m.
-        """
+        """Force of the fluid on each of `count` spheres (N, 3), side walls (3,), over mu U, m."""
         # a node's force is per volume of a cell, in units of the spacing along x
         scale = -np.prod(self.lattice.spacing) / self.lattice.unit**2
         on_spheres, on_walls = np.zeros((count, 3)), np.zeros(3)
@@ -548,19 +526,12 @@ def solve(
     slip: float,
     change: float | None = None,
 ) -> GridFlow:
-    """The flow around spheres with a superficial velocity of 1 along x.
+    """The flow around spheres of `position` and `radius` m, superficial velocity 1 along x.
 
-    Args:
-        lattice: the grid.
-        position: (N, 3) m, centres of the spheres.
-        radius: (N,) m.
-        slip: rms velocity over the superficial one that may be left at the walls.
-        change: share by which k may still have fallen over the last quarter of the iterations, at
-            least 10, where that counts too.
-
-    Raises:
-        NetworkError: no node of the grid feels a wall.
-        FlowError: the iterations run out, or rounding has taken over.
+    It ends at the rms velocity `slip` over the superficial one at the walls, and where there is a
+    `change`, when k fell by less than this share over the last quarter of the iterations, at least
+    10. Raises NetworkError where no node of the grid feels a wall, and FlowError where the
+    iterations run out or rounding has taken over.
     """
     walls = [find_walls(lattice, d, position, radius) for d in range(3)]
     if not len(walls[0].node):
@@ -576,9 +547,6 @@ def solve(
         fell = resistance[-1] - resistance[max(0, iterations + 1 - window)]
         if left <= slip and (change is None or not left or fell < change * resistance[-1]):
             break
-        if iterations % 25 == 0 and iterations:
-            k = lattice.cells / resistance[-1]
-            PROGRESS.info("iteration %d: k %.6g spacings squared, slip %.2g", iterations, k, left)
         if iterations == MOST_ITERATIONS or not gained >= 0.0:
             raise FlowError(
                 f"resolved flow: a slip of {left:.3g} of the superficial velocity is left at the "
@@ -592,8 +560,7 @@ def solve(
     total, energy = summed_product(problem.right, scaled), summed_product(scaled, moved)
     rest, drift = problem.right - moved, np.array([1.0, 0.0, 0.0])
     for d in problem.drifting:
-        if problem.norms[d]:
-            drift[d] = summed_product(problem.weight[d], rest[d]) / problem.norms[d]
+        drift[d] = summed_product(problem.weight[d], rest[d]) / problem.norms[d]
     problem.project(rest)
     return GridFlow(
         lattice=lattice,
@@ -612,23 +579,20 @@ def solve(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class StokesFlow:
-    """A solved cell or slab.
-
-    Attributes:
-        k: permeability along the axis, m2.
-        iterations: of the conjugate gradients.
-        residual: rms velocity that is left at the walls over the superficial velocity.
-        seconds: that the solve took.
-        cells: on the longest edge.
-        unknowns: number of forces.
-    """
+    """A solved cell or slab."""
 
     k: float
+    """Permeability along x, m2."""
     iterations: int
+    """Of the conjugate gradients."""
     residual: float
+    """Rms velocity that is left at the walls over the superficial velocity."""
     seconds: float
+    """That the solve took."""
     cells: int
+    """On the longest edge."""
     unknowns: int
+    """Number of forces."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -642,17 +606,10 @@ class Estimate:
 def solve_stokes(spheres: Snapshot, *, cells: int, tolerance: float = 1e-4) -> StokesFlow:
     """Permeability along x of the periodic cell `spheres.box`, where the fluid may flow sideways.
 
-    Progress goes to the log of this module every 25 iterations.
-
-    Args:
-        spheres: the solid.
-        cells: on the longest edge of the cell.
-        tolerance: the solve ends when k fell by less than this share over the last quarter of the
-            iterations, and the rms slip at the walls is below 5 % of the mean velocity.
-
-    Raises:
-        CaseError: the grid is too coarse, or there is no wall.
-        FlowError: the iterations run out.
+    There are `cells` on the longest edge. The solve ends when k fell by less than `tolerance` over
+    the last quarter of the iterations, and the rms slip at the walls is below 5 % of the mean
+    velocity. Raises CaseError where
+    the grid is too coarse or there is no wall, FlowError where the iterations run out.
     """
     return _reference(spheres, spheres.box, cells, tolerance, OPEN, planes=False)
 
@@ -714,13 +671,11 @@ def _reference(
 def extrapolate(coarse: StokesFlow, fine: StokesFlow, *, order: float = 2.0) -> Estimate:
     """Richardson extrapolation of two grids of the same cell; the error is a third of its step.
 
-    Raises:
-        CaseError: the second grid is not the finer one.
+    Raises CaseError where the second grid is not the finer one.
     """
     if fine.cells <= coarse.cells:
         raise CaseError(
-            f"stokes: grids of {coarse.cells} and {fine.cells} cells, "
-            "expected the second to be finer"
+            f"stokes: grids of {coarse.cells} and {fine.cells} cells, expected a finer second one"
         )
     step = (fine.k - coarse.k) / ((fine.cells / coarse.cells) ** order - 1.0)
     return Estimate(k=fine.k + step, error=abs(step) / 3.0 / (fine.k + step))

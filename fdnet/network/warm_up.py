@@ -19,9 +19,9 @@ def compiling(sides: str, *, wanted: bool) -> Iterator[Callable[[], object]]:
 
     Nothing is started where it is not `wanted`, or where this version has compiled something.
     """
-    from fdnet.network.compiled import is_cold, say_compiling
+    from fdnet.network.compiled import COLD, say_compiling
 
-    if not wanted or not is_cold():
+    if not wanted or not COLD:
         yield lambda: None
         return
     say_compiling()

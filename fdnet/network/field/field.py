@@ -1,8 +1,7 @@
-"""The velocity field of a pack.
+"""The velocity field of a pack, with a deposit of fines or without.
 
-The velocity of the fluid in the pores of a pack, with a deposit of fines or without: a coarse
-resolved Stokes flow (`fdnet.network.stokes`), interpolated down to the walls (`sampled`). Formulas
-and checks: docs/theory/resolved_flow.md.
+A coarse resolved Stokes flow (`fdnet.network.stokes`), interpolated down to the walls (`sampled`).
+Formulas and checks: docs/theory/resolved_flow.md.
 """
 
 from dataclasses import dataclass
@@ -70,23 +69,17 @@ class VelocityField:
         return (self.lattice.specimen[1] - self.lattice.specimen[0]) / self.resistance
 
     def at(self, points: Any) -> Array:
-        """Fluid velocity over U, (N, 3), at points (N, 3) m.
+        """Fluid velocity over U, (N, 3), at points (N, 3) m. Raises CaseError on other shapes.
 
         It is 0 in the solid and (1, 0, 0) before and beyond the grid of a specimen that is not
         periodic along x.
-
-        Raises:
-            CaseError: the points are not (N, 3) finite numbers.
         """
         return velocity_at(self.lattice, *self._smooth, _checked(points))
 
     def pressure_gradient_at(self, points: Any) -> Array:
         """Gradient of the pressure over mu U, (N, 3) 1/m2, at points (N, 3) m.
 
-        In the solid it is that of the fluid around it.
-
-        Raises:
-            CaseError: the points are not (N, 3) finite numbers.
+        In the solid it is that of the fluid around it. Raises CaseError as `at` does.
         """
         return gradient_at(self.lattice, self._gradient, _checked(points))
 
@@ -115,12 +108,11 @@ class VelocityField:
 def _checked(points: Any) -> Array:
     """Numbers (N, 3). Raises CaseError on others."""
     array = np.asarray(points, float)
-    if array.ndim != 2 or array.shape[1] != 3:
+    if array.ndim != 2 or array.shape[1] != 3 or not np.all(np.isfinite(array)):
         raise CaseError(
-            f"velocity field: numbers of shape {array.shape}, expected (N, 3), x, y, z"
+            f"velocity field: points of shape {array.shape}, or one that is not finite; expected "
+            "(N, 3) finite numbers x, y, z"
         )
-    if not np.all(np.isfinite(array)):
-        raise CaseError("velocity field: a value is not finite, expected numbers, x, y, z")
     return array
 
 
@@ -203,20 +195,11 @@ def velocity_field(
 def build_lattice(
     box: Array, periodic: Walled, *, spacing: float, upstream: float, downstream: float
 ) -> Lattice:
-    """The grid of a specimen, which always wraps along x.
+    """The grid of a specimen in a `box` (3, 2) m, which always wraps along x.
 
-    A specimen that is not periodic along x lies in a gap of clear fluid that is wide enough for
-    the flow to become even again.
-
-    Args:
-        box: (3, 2) m, bounds of the specimen.
-        periodic: whether its sides x, y, z are periodic.
-        spacing: m, the largest edge of a cell.
-        upstream: m of clear fluid before the specimen; without meaning where x is periodic.
-        downstream: m of clear fluid, at least, beyond the specimen; likewise.
-
-    Raises:
-        NetworkError: the box has no extent, or the spacing is not positive.
+    No edge of a cell is longer than `spacing` m. A specimen that is not periodic along x lies in a
+    gap of clear fluid, `upstream` m and at least `downstream` m long, in which the flow becomes
+    even again. Raises NetworkError where the box has no extent or the spacing is not positive.
     """
     edges = box[:, 1] - box[:, 0]
     if not (np.all(edges > 0.0) and 0.0 < spacing < np.inf):

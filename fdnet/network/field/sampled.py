@@ -39,19 +39,15 @@ class CellFrame(NamedTuple):
 
 
 class Nearby(NamedTuple):
-    """Walls near each cell of a grid.
-
-    Attributes:
-        first: (cells + 1,) row where the spheres of each cell begin.
-        place: (K, 4) centre and radius of a sphere, shifted by periods to where it stands next to
-            the cell.
-        sides: (6,) lower and upper x between which the side walls hold the fluid; places of the
-            lower and upper walls across y, then z, infinitely far away where there is none.
-    """
+    """Walls near each cell of a grid."""
 
     first: Array
+    """(cells + 1,) row where the spheres of each cell begin."""
     place: Array
+    """(K, 4) centre and radius of a sphere, shifted by periods to stand next to the cell."""
     sides: Array
+    """(6,) lower and upper x between which the side walls hold the fluid; places of the lower and
+    upper walls across y, then z, infinitely far away where there is none."""
 
 
 class Near(NamedTuple):
@@ -379,8 +375,8 @@ def _turn_along_walls(
 ) -> None:
     """Takes the part across its sphere from velocity / phi at nodes in the solid.
 
-    Across a wall velocity / phi is 0 at the wall, where along it it is not. `part` holds the nodes
-    of this component of `smooth` without those added around, and is changed.
+    Across a wall that is 0 at the wall, along it not. `part` holds the nodes of this component of
+    `smooth` without those added around, and is changed.
     """
     shape = part.shape
     away = np.full(3, 0.5)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled, loops_in_place
 from fdnet.network.fines.deposit import Grid, cells_between, grid_of
 from fdnet.spheres.geometry import make_images, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot
@@ -23,19 +23,15 @@ _NODE, _WEIGHT = np.polynomial.legendre.leggauss(4)
 
 
 class Neighbourhood(NamedTuple):
-    """What surrounds each fine (N,).
-
-    Attributes:
-        porosity: (N,) of the fines around it, in the space outside of grains and walls.
-        size_ratio: (N,) its diameter over the Sauter mean diameter of these fines, itself among
-            them.
-        capped: number of fines around which the fraction came out above `DENSEST` (the overlaps of
-            contacts are counted twice); their porosity is 1 - `DENSEST`.
-    """
+    """What surrounds each fine (N,)."""
 
     porosity: Array
+    """(N,) of the fines around it, in the space outside of grains and walls."""
     size_ratio: Array
+    """(N,) its diameter over the Sauter mean diameter of these fines, itself among them."""
     capped: int
+    """Number of fines around which the fraction came out above `DENSEST` (the overlaps of contacts
+    are counted twice); their porosity is 1 - `DENSEST`."""
 
 
 def local_porosity(
@@ -104,7 +100,7 @@ def _taken(
     return total
 
 
-@compiled_in_place
+@loops_in_place
 def _gather(
     grid: Grid, place: Array, radius: Array, most: float, centre: Array, ball: Array, total: Array
 ) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fdnet.network import geometry
-from fdnet.network.compiled import compiled, compiled_in_place
+from fdnet.network.compiled import compiled, loops_in_place
 from fdnet.network.network import Network
 from fdnet.network.tessellation.delaunay import Vector, along, times
 from fdnet.spheres.geometry import make_images
@@ -64,7 +64,7 @@ def grid_of(point: Array, edge: float | None = None) -> tuple[Grid, Array]:
     return Grid(start, edge, shape, first), order
 
 
-@compiled_in_place
+@loops_in_place
 def cells_between(
     low: float, high: float, start: float, edge: float, number: int
 ) -> tuple[int, int]:
@@ -76,7 +76,7 @@ def cells_between(
     return int(min(max(lower, 0.0), float(number))), int(min(max(upper, 0.0), float(number)))
 
 
-@compiled_in_place
+@loops_in_place
 def _search(
     grid: Grid, point: Array, low: Array, high: Array, count: Array, inside: Array
 ) -> None:
@@ -136,15 +136,9 @@ OTHERS = np.array([(1, 2, 3), (2, 3, 0), (3, 0, 1), (0, 1, 2)])
 def pieces(corner: Array, pore: Array, ball: Array, centre: Array, radius: Array) -> Array:
     """Volume m3 and surface m2 (K, 2) of the piece of a ball in a tetrahedron, pair by pair.
 
-    Both are 0 where the two are apart. Pieces below 1e-13 cubes of the radius are rounding and
-    left out.
-
-    Args:
-        corner: (P, 4, 3) m, corners of the tetrahedra.
-        pore: (K,) index of the tetrahedron of each pair.
-        ball: (K,) index of the ball, which may be apart from it.
-        centre: (N, 3) m, of the balls.
-        radius: (N,) m, of the balls.
+    Pair k is tetrahedron `pore[k]` of those with the corners `corner` (P, 4, 3) m, and ball
+    `ball[k]` of those of `centre` (N, 3) m and `radius` (N,) m. Both numbers are 0 where the two
+    are apart. Pieces below 1e-13 cubes of the radius are rounding and left out.
     """
     normal, place, depth = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(4)
     measured = np.zeros((len(pore), 2))
@@ -283,16 +277,10 @@ PARTS = {
 
 
 def clip_to_box(corner: Array, box: Array, periodic: tuple[bool, ...]) -> tuple[Array, Array]:
-    """The parts of tetrahedra within the faces of `box` that are not periodic.
+    """The parts of tetrahedra within the faces of `box` (3, 2) m that are not `periodic`.
 
-    Args:
-        corner: (C, 4, 3) m, corners of the tetrahedra.
-        box: (3, 2) m, lower and upper bounds.
-        periodic: whether the axes x, y and z are periodic; their faces cut nothing.
-
-    Returns:
-        Corners (K, 4, 3) m of the tetrahedra that make up the parts, and the index (K,) of the
-        tetrahedron that each is a part of.
+    From corners (C, 4, 3) m of tetrahedra to those (K, 4, 3) m of the tetrahedra that make up the
+    parts, and the index (K,) of the tetrahedron that each is a part of.
     """
     owner = np.arange(len(corner))
     for axis in range(3):
@@ -363,8 +351,8 @@ def images_near(
     """Places (M, 3) m and owners (M,) of all images near a region.
 
     They are those across periodic sides, and the mirror images beyond the other faces where
-    `mirrored`. The region is [`low`, `high`] (3,) m, widened by `largest` m. A centre (`position`,
-    (N, 3) m) on or beyond a face that is not periodic has no mirror image there.
+    `mirrored`. The region is [`low`, `high`] (3,) m, widened by `largest` m. A centre on or beyond
+    a face that is not periodic has no mirror image there.
     """
     beyond = np.maximum(network.box[:, 0] - low, high - network.box[:, 1])
     margin = np.maximum(beyond, 0.0) + largest
@@ -447,21 +435,18 @@ def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Deposit:
-    """Fines (N) and their K pieces in the pores (P), sorted by the id of the fine, then by pore.
-
-    Attributes:
-        network: whose pores they are.
-        fines: as they were measured.
-        pore: (K,) that holds the piece.
-        fine: (K,) index of the fine.
-        volume: (K,) m3 of the fine in the pore, over the share of the pore inside the box.
-    """
+    """Fines (N) and their K pieces in the pores (P), sorted by id of the fine, then by pore."""
 
     network: Network
+    """Whose pores they are."""
     fines: Snapshot
+    """As they were measured."""
     pore: Array
+    """(K,) that holds the piece."""
     fine: Array
+    """(K,) index of the fine."""
     volume: Array
+    """(K,) m3 of the fine in the pore, over the share of the pore inside the box."""
 
     __repr__ = one_line
 

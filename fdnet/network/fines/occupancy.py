@@ -21,28 +21,25 @@ from fdnet.network.fines.deposit import (
     reaching_inside,
 )
 from fdnet.network.network import Network
-from fdnet.spheres.snapshot import Array, Snapshot, frozen
+from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line
 
 GAUSS_POINTS = 10
 """Points of the Gauss-Legendre rule of `exact_volume`."""
 
 
 class Pairs(NamedTuple):
-    """K pairs of a sphere and a cylinder, which spans depth 0 to its length.
-
-    Attributes:
-        sphere: (K,) m, radius of the sphere.
-        offset: (K,) m, distance of the centre of the sphere from the axis.
-        depth: (K,) m, place of the centre along the axis.
-        tube: (K,) m, radius of the cylinder.
-        length: (K,) m, of the cylinder.
-    """
+    """K pairs of a sphere and a cylinder, which spans depth 0 to its length."""
 
     sphere: Array
+    """(K,) m, radius of the sphere."""
     offset: Array
+    """(K,) m, distance of the centre of the sphere from the axis."""
     depth: Array
+    """(K,) m, place of the centre along the axis."""
     tube: Array
+    """(K,) m, radius of the cylinder."""
     length: Array
+    """(K,) m, of the cylinder."""
 
     def where(self, mask: Array) -> "Pairs":
         """The pairs for which `mask` (K,) is true."""
@@ -164,12 +161,8 @@ def two_plane_volume(pairs: Pairs) -> Array:
 def covers_section(pairs: Pairs) -> Array:
     """True (K,) where the sphere covers a whole section of the cylinder (Shi 2011, figure 39)."""
     nearest = np.clip(pairs.depth, 0.0, pairs.length) - pairs.depth
-    square = pairs.sphere**2 - nearest**2
-    return (
-        (pairs.tube > 0)
-        & (square > 0)
-        & (np.sqrt(np.maximum(square, 0.0)) >= pairs.offset + pairs.tube)
-    )
+    reach = np.sqrt(np.maximum(pairs.sphere**2 - nearest**2, 0.0))
+    return (pairs.tube > 0) & (reach > 0) & (reach >= pairs.offset + pairs.tube)
 
 
 OVERLAPS = {"exact": exact_volume, "two-plane": two_plane_volume}
@@ -223,13 +216,7 @@ class Occupancy:
     fines: Snapshot
     counts: Mapping[str, int]
 
-    def __repr__(self) -> str:
-        return (
-            f"Occupancy({int(np.sum(self.throat_fines > 0))} of {len(self.throat_fines)} throats "
-            f"with fines, {int(np.sum(self.blocked))} blocked, "
-            f"{float(np.sum(self.pore_solid_volume)):.4g} m3 of fines in "
-            f"{int(np.sum(self.pore_solid_volume > 0))} of {len(self.pore_solid_volume)} pores)"
-        )
+    __repr__ = one_line
 
 
 def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exact") -> Occupancy:

@@ -27,17 +27,14 @@ SHORTEST_SHARE = 1e-3
 
 
 class Links(NamedTuple):
-    """K conductances between pores and the two planes.
-
-    Attributes:
-        ends: (K, 2) number of the group of the pore (`Network.pore_group`), or INLET, or OUTLET.
-        conductance: (K,) m3 (flux times viscosity over pressure drop).
-        throat: (K,) index of the throat that the link is, or is a part of.
-    """
+    """K conductances between pores and the two planes."""
 
     ends: Array
+    """(K, 2) number of the group of the pore (`Network.pore_group`), or INLET, or OUTLET."""
     conductance: Array
+    """(K,) m3 (flux times viscosity over pressure drop)."""
     throat: Array
+    """(K,) index of the throat that the link is, or is a part of."""
 
 
 def open_links(network: Network, conductance: Array) -> Links:
@@ -68,14 +65,11 @@ def check_conductance(conductance: Array, count: int) -> None:
 def links_between(
     network: Network, conductance: Array, span: tuple[float, float]
 ) -> tuple[Links, Array, Array]:
-    """The links that carry flow between the planes at `span` = (low, high) m.
+    """The links that carry flow between the planes at `span` = (low, high) m, both included.
 
-    `conductance` (T,) m3 is that of the throats.
-
-    Returns:
-        links: those whose ends are all planes or groups of pores that are tied to both planes.
-        place: (G,) INLET, OUTLET or BETWEEN for each group of pores.
-        free: (G,) true for groups between the planes that open links tie to both.
+    `conductance` (T,) m3 is that of the throats. Returns the links, whose ends are planes or
+    groups of pores that are tied to both planes; for each group (G,) INLET, OUTLET or BETWEEN; and
+    whether (G,) it lies between the planes and open links tie it to both.
     """
     first = np.unique(network.pore_group, return_index=True)[1]
     place = _places(network, network.pore_position[first, 0], span)
@@ -90,13 +84,9 @@ def links_between(
 
 
 def links_around(network: Network, conductance: Array) -> tuple[Links, Array]:
-    """The links that carry flow around the period along x.
+    """The links that go once around the period along x, and the groups of pores (G,) on them.
 
     `conductance` (T,) m3 is that of the throats.
-
-    Returns:
-        links: those in clusters that go once around the period.
-        live: (G,) true for the groups of pores in these clusters.
     """
     group, carried = network.pore_group, conductance * network.throat_share
     ends, jump = group[network.throat_pores], network.throat_shift[:, 0].astype(float)

@@ -16,17 +16,14 @@ from fdnet.spheres.snapshot import Array, frozen, one_line
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SlabK:
-    """Permeability of S slabs of one state of a specimen.
-
-    Attributes:
-        cut_out: (S,) m2, of each slab alone, with the pressure held on its two planes.
-        inplace: (S,) m2, from the pressures of the whole specimen.
-        flows: S flows through the slabs cut out.
-    """
+    """Permeability of S slabs of one state of a specimen."""
 
     cut_out: Array
+    """(S,) m2, of each slab alone, with the pressure held on its two planes."""
     inplace: Array
+    """(S,) m2, from the pressures of the whole specimen."""
     flows: tuple[Flow, ...]
+    """S flows through the slabs cut out."""
 
     __repr__ = one_line
 
@@ -52,9 +49,8 @@ def inplace_permeability(
 
     k = Q mu dx / (A dp), with the thickness dx of the slab, the cross-section A of the box, the
     flow Q, the viscosity mu and the difference dp between the flux-weighted mean pressures of the
-    two planes (`plane_pressures`). That is the energy which the slab spends over the flow: it is
-    always positive, and the differences add up to that of the whole. Without flow the permeability
-    is 0.
+    two planes (`plane_pressures`): the energy that the slab spends over the flow, which is always
+    positive. The differences add up to that of the whole. Without flow the permeability is 0.
     """
     if flow.inflow == 0:
         return np.zeros(len(edges) - 1)
@@ -68,10 +64,9 @@ def plane_pressures(
     """Flux-weighted mean pressure (n,) on `planes` (n,) m: 1 on the low x face, 0 on the high.
 
     With the resistances `halves` (T, 2) 1/m3 of the throats the pressure falls from the first node
-    (`nodes`) to the facet by the first of them, and from there to the second node by the other.
-    Most of a throat's drop is in its neck, so this places it where it is. Without them it falls
-    evenly along each throat. Where x is periodic the pressure is 1 on the low face and falls by 1
-    per period.
+    (`nodes`) to the facet by the first of them, and from there to the second node by the other;
+    without them evenly along each throat. Most of a throat's drop is in its neck. Where x is
+    periodic the pressure is 1 on the low face and falls by 1 per period.
     """
     x, pressure, flux = _pieces(network, flow, halves)
     low, high = map(float, network.box[0])
@@ -134,23 +129,20 @@ MOST_LAYERS = 200
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Layers:
-    """B thin layers from the formation face, in place: under the pressures of the whole specimen.
-
-    Attributes:
-        edges: (B+1,) m.
-        k_initial: (B,) m2, without fines.
-        k_damaged: (B,) m2, with fines; 0 without flow.
-        drop_initial: (B,) share of the specimen's pressure drop in the layer, without fines.
-        drop_damaged: (B,) the same with fines; NaN without flow.
-        fines_count: (B,) number of fines centred in the layer.
-    """
+    """B thin layers from the formation face, under the pressures of the whole specimen."""
 
     edges: Array
+    """(B+1,) m."""
     k_initial: Array
+    """(B,) m2, without fines."""
     k_damaged: Array
+    """(B,) m2, with fines; 0 without flow."""
     drop_initial: Array
+    """(B,) share of the specimen's pressure drop in the layer, without fines."""
     drop_damaged: Array
+    """(B,) the same with fines; NaN without flow."""
     fines_count: Array
+    """(B,) number of fines centred in the layer."""
 
     __repr__ = one_line
 
@@ -185,34 +177,32 @@ class Section:
     "Cut out" is the slab alone, with the pressure held on its two planes (Shi 2011, section
     3.3.1). "In place" is the slab under the pressures of the whole specimen; in series these
     values make up the permeability of the whole.
-
-    Attributes:
-        section: number of the slab, from 1 at the low x face.
-        x_lo: m, lower bound.
-        x_hi: m, upper bound.
-        porosity_initial: without fines, overlap of spheres counted once.
-        porosity_damaged: with fines, overlap of spheres counted once.
-        k_initial: m2, cut out, without fines.
-        k_damaged: m2, cut out, with fines.
-        k_reduction: 1 - k_damaged / k_initial; None where k_initial is 0.
-        k_initial_inplace: m2, in place, without fines.
-        k_damaged_inplace: m2, in place, with fines.
-        fines_count: number of fines centred in the slab.
-        fines_fraction: these as a share of all invaded fines.
     """
 
     section: int
+    """Number of the slab, from 1 at the low x face."""
     x_lo: float
+    """m, lower bound."""
     x_hi: float
+    """m, upper bound."""
     porosity_initial: float
+    """Without fines, overlap of spheres counted once."""
     porosity_damaged: float
+    """With fines, overlap of spheres counted once."""
     k_initial: float
+    """m2, cut out, without fines."""
     k_damaged: float
+    """m2, cut out, with fines."""
     k_reduction: float | None
+    """1 - k_damaged / k_initial; None where k_initial is 0."""
     k_initial_inplace: float
+    """m2, in place, without fines."""
     k_damaged_inplace: float
+    """m2, in place, with fines."""
     fines_count: int
+    """Number of fines centred in the slab."""
     fines_fraction: float
+    """These as a share of all invaded fines."""
 
     def row(self) -> dict[str, Any]:
         """The values by the names of sections.csv, which end in their unit (m, m2)."""
@@ -228,19 +218,16 @@ SECTION_UNITS = dict.fromkeys(("x_lo", "x_hi"), "_m") | dict.fromkeys(
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Profile:
-    """Porosity and fines in B finer bins of depth.
-
-    Attributes:
-        edges: (B+1,) m.
-        porosity_initial: (B,) without fines.
-        porosity_damaged: (B,) with fines.
-        fines_fraction: (B,) share of all invaded fines.
-    """
+    """Porosity and fines in B finer bins of depth."""
 
     edges: Array
+    """(B+1,) m."""
     porosity_initial: Array
+    """(B,) without fines."""
     porosity_damaged: Array
+    """(B,) with fines."""
     fines_fraction: Array
+    """(B,) share of all invaded fines."""
 
     __repr__ = one_line
 
@@ -274,10 +261,9 @@ def profile_edges(bin_size: float, box: Array) -> Array:
 def make_sections(
     edges: Array, porosity: tuple[Porosity, Porosity], k: tuple[SlabK, SlabK], depth: Array
 ) -> tuple[Section, ...]:
-    """Sections between `edges` (S+1,) m from the states before and after.
+    """Sections between `edges` (S+1,) m from porosity and slab permeabilities before and after.
 
-    `porosity` and `k` hold the porosity and the slab permeabilities of the two states; `depth`
-    (F,) m are the places of the invaded fines along x.
+    `depth` (F,) m are the places of the invaded fines along x.
     """
     count = np.histogram(depth, edges)[0]
     share = count / max(len(depth), 1)
@@ -330,10 +316,7 @@ def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array
 
 
 def pooled(porosity: Porosity, edges: Array) -> Array:
-    """Porosity (S,) between `edges` (S+1,) m, averaged from the finer profile of `porosity`.
-
-    The edges must be among those of the profile.
-    """
+    """Porosity (S,) between `edges` (S+1,) m, which are among those of its finer profile."""
     first = np.searchsorted(porosity.edges, edges[:-1])
     end = np.searchsorted(porosity.edges, edges[-1])
     width, void = np.diff(porosity.edges)[:end], porosity.profile[:end]

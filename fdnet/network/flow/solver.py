@@ -4,7 +4,7 @@ Systems are symmetric and positive definite.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pyamg
@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 
 from fdnet.errors import FlowError
 from fdnet.network.compiled import compiled
-from fdnet.spheres.snapshot import Array, one_line
+from fdnet.spheres.snapshot import Array
 
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
 DIRECT_UP_TO = 3_000
@@ -300,11 +300,10 @@ def _root(parent: Array, rise: Array, node: int) -> int:
 # Node 0 and the first node of every further group have the pressure 0.
 #
 # The critical conductance of a node is that of the weakest link in the best closed loop with a
-# jump through it. No more than a few times that flows through the node per unit of drive. A link
-# that is far more conductive takes next to none of the drive, and its pressure difference is
-# smaller than a number can hold. So it is taken as `CONTRAST` times the critical conductance.
-# The throughput changes by some 1 / CONTRAST; where such links lie side by side, the share of
-# each in their flux follows the conductance that they are taken as.
+# jump through it. A link that is far more conductive takes next to none of the drive, and its
+# pressure difference is smaller than a number can hold. So it is taken as `CONTRAST` times the
+# critical conductance. The throughput changes by some 1 / CONTRAST; where such links lie side by
+# side, the share of each in their flux follows the conductance that they are taken as.
 
 
 CONTRAST = 1e14
@@ -316,37 +315,25 @@ SETTLED = 1e-9
 MOST_SWEEPS = 30
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Balance:
-    """Pressures of n nodes and fluxes of K links.
-
-    Attributes:
-        pressure: (n,) over the unit of the jumps.
-        flux: (K,) from the first to the second end, in units of conductance times jump.
-        defect: sum of the imbalances of the nodes over the throughput; it bounds the relative
-            error of the throughput.
-        method: how the system was solved.
-    """
+class Balance(NamedTuple):
+    """Pressures of n nodes and fluxes of K links."""
 
     pressure: Array
+    """(n,) over the unit of the jumps."""
     flux: Array
+    """(K,) from the first to the second end, in units of conductance times jump."""
     defect: float
+    """Sum of the imbalances of the nodes over the throughput; it bounds its relative error."""
     method: str
-
-    __repr__ = one_line
+    """How the system was solved."""
 
 
 def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> Balance:
-    """Balance of all nodes, every one of which must be in a group that winds.
+    """Balance of `count` nodes, every one of which must be in a group that winds.
 
-    What the fluxes lack in balance is solved for again, until the defect is `SETTLED`. Fluxes add
-    up by increments, never as differences of nearly equal pressures. The caller judges the defect.
-
-    Args:
-        ends: (K, 2) nodes that the links join.
-        conductance: (K,) above 0.
-        jump: (K,) of the links.
-        count: number of nodes.
+    Links have the `ends` (K, 2), the `conductance` (K,) above 0 and the `jump` (K,). What the
+    fluxes lack in balance is solved for again, until the defect is `SETTLED`. Fluxes add up by
+    increments, never as differences of nearly equal pressures. The caller judges the defect.
     """
     conductance = held_conductance(ends, conductance, jump, count)
     free = np.ones(count, bool)
@@ -368,7 +355,7 @@ def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> B
         allowed = 0.3 * SETTLED * abs(throughput)
         if defect <= SETTLED or not defect < 0.7 * before:
             break
-    return Balance(pressure=pressure, flux=flux, defect=defect, method=balances.method)
+    return Balance(pressure, flux, defect, balances.method)
 
 
 def held_conductance(ends: Array, conductance: Array, jump: Array, count: int) -> Array:

@@ -202,29 +202,26 @@ SHAKE_SEED = 3_141_592
 
 
 class ImagePoints(NamedTuple):
-    """M images of n grains, the grains themselves among them.
-
-    Attributes:
-        owner: (M,) index of the grain.
-        position: (M, 3) m, centre of the image.
-        shift: (M, 3) whole periods by which the image is moved along each axis.
-        mirror: (M, 3) one of INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE of `spheres.geometry`.
-        radius: (M,) m.
-        shaken: (M, 3) m, centre after the shake.
-        scaled: (M, 3) shaken centre from the low corner of the box, in mean grain radii.
-        name: (M,) integer of grain and mirror image; images that differ by periods share it.
-        key: (M,) integer that orders the images by name, then by shift.
-    """
+    """M images of n grains, the grains themselves among them."""
 
     owner: Array
+    """(M,) index of the grain."""
     position: Array
+    """(M, 3) m, centre of the image."""
     shift: Array
+    """(M, 3) whole periods by which the image is moved along each axis."""
     mirror: Array
+    """(M, 3) one of INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE of `spheres.geometry`."""
     radius: Array
+    """(M,) m."""
     shaken: Array
+    """(M, 3) m, centre after the shake."""
     scaled: Array
+    """(M, 3) shaken centre from the low corner of the box, in mean grain radii."""
     name: Array
+    """(M,) integer of grain and mirror image; images that differ by periods share it."""
     key: Array
+    """(M,) integer that orders the images by name, then by shift."""
 
 
 def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) -> ImagePoints:
@@ -298,11 +295,10 @@ def centres(
     """Power centre (P, 3) m, reach (P,) m, volume (P,) m3 and flatness (P,) of tetrahedra.
 
     The power of a point x to a sphere of centre p and radius r is |x - p|^2 - r^2; the centre has
-    equal power to the four corners (Aurenhammer 1987, SIAM J. Comput. 16, 78). `position` and
-    `shaken` (M, 3) m are the points, `radius` (M,) m their spheres, `vertex` (P, 4) the corners. A
-    tetrahedron of less volume than `flattest` m3 is flat and takes the centre of its shaken
-    corners. The reach is the radius about the centre in which the centre of a sphere of radius
-    `largest` m would have less power.
+    equal power to the four corners (Aurenhammer 1987, SIAM J. Comput. 16, 78). `vertex` (P, 4) are
+    the corners among the points `position` and `shaken` (M, 3) m. A tetrahedron of less volume
+    than `flattest` m3 is flat and takes the centre of its shaken corners. The reach is the radius
+    about the centre in which the centre of a sphere of radius `largest` m would have less power.
     """
     count = len(vertex)
     centre, reach = np.empty((count, 3)), np.empty(count)
@@ -481,29 +477,26 @@ EQUAL_SPREAD = 1e-3
 
 
 class Tetrahedra(NamedTuple):
-    """P unique tetrahedra between M points.
-
-    Attributes:
-        points: the M points, images of the grains.
-        vertex: (P, 4) points at the corners.
-        neighbour: (P, 4) tetrahedron across the facet opposite each corner; -1 where that lies
-            across a period or beyond a wall.
-        centre: (P, 3) m, power centre: the point of equal power to the four grains.
-        volume: (P,) m3.
-        flat: (P,) whether the volume is below 1e-5 mean radii cubed; the centre is then arbitrary.
-        margin: (3,) m, how far beyond the box the spheres reach that must be empty: those about a
-            centre in which the centre of another grain would have changed the tetrahedron.
-        hidden: number of grains without any tetrahedron.
-    """
+    """P unique tetrahedra between M points."""
 
     points: ImagePoints
+    """The M points, images of the grains."""
     vertex: Array
+    """(P, 4) points at the corners."""
     neighbour: Array
+    """(P, 4) tetrahedron across the facet opposite each corner; -1 where that lies across a period
+    or beyond a wall."""
     centre: Array
+    """(P, 3) m, power centre: the point of equal power to the four grains."""
     volume: Array
+    """(P,) m3."""
     flat: Array
+    """(P,) whether the volume is below 1e-5 mean radii cubed; the centre is then arbitrary."""
     margin: Array
+    """(3,) m, how far beyond the box the spheres reach that must be empty: those about a centre in
+    which the centre of another grain would have changed the tetrahedron."""
     hidden: int
+    """Number of grains without any tetrahedron."""
 
 
 def make_tetrahedra(
