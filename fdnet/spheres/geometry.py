@@ -154,19 +154,13 @@ INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE = 0, 1, 2, 3
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Images:
-    """M images, the spheres themselves among them.
+    """M images, the spheres themselves among them."""
 
-    Attributes:
-        owner: (M,) index of the sphere.
-        position: (M, 3) centres, m.
-        shift: (M, 3) number of periods along each axis.
-        mirror: (M, 3) INSIDE, MIRROR_LOW or MIRROR_HIGH along each axis; ON_FACE for a centre on
-            or beyond a face, which has no mirror image across that axis.
-    """
-
-    owner: Array
-    position: Array
-    shift: Array
+    owner: Array  # (M,) index of the sphere
+    position: Array  # (M, 3) centres, m
+    shift: Array  # (M, 3) number of periods along each axis
+    # (M, 3) INSIDE, MIRROR_LOW or MIRROR_HIGH along each axis; ON_FACE for a centre on or beyond a
+    # face, which has no mirror image across that axis
     mirror: Array
 
 

@@ -251,18 +251,13 @@ _SAME_BOX = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SphereFile:
-    """What a file of spheres holds.
+    """What a file of spheres holds."""
 
-    Attributes:
-        spheres: the spheres, SI units.
-        assumptions: what the reader assumed where neither the file nor the caller says it.
-        around_grains: whether the box is the one around all grains, for want of another.
-        warnings: what is wrong with the file or contradicts it, one sentence each.
-    """
-
-    spheres: Snapshot
+    spheres: Snapshot  # the spheres, SI units
+    # what the reader assumed where neither the file nor the caller says it
     assumptions: tuple[str, ...]
-    around_grains: bool
+    around_grains: bool  # whether the box is the one around all grains, for want of another
+    # what is wrong with the file or contradicts it, one sentence each
     warnings: tuple[str, ...] = ()
 
     @property
