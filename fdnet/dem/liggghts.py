@@ -86,8 +86,7 @@ def verify(folder: Path, deck: str, code: int) -> None:
             )
         return
     evidence = bad[0] if bad else evidence
-    if disk_is_full(folder):
-        evidence = f"the disk is full ({evidence})"
+    evidence = f"the disk is full ({evidence})" if disk_is_full(folder) else evidence
     state = f"ended by signal {-code}" if code < 0 else f"exit {code}"
     finished = "" if bad else f", no {END_MARK} line"
     raise LiggghtsError(
@@ -98,16 +97,12 @@ def verify(folder: Path, deck: str, code: int) -> None:
 
 def _advice(bad: list[str]) -> str:
     """What helps: another case where it would happen again, --resume for causes outside."""
+    anew = "and start over with --force or another --out"
     if any("Lost atoms" in line for line in bad):
-        return (
-            "spheres were thrown out: lower run.time_step_factor or drag.multiplier, or raise "
-            "run.stiffness_N_m, and start over with --force or another --out"
-        )
+        change = "lower run.time_step_factor or drag.multiplier, or raise run.stiffness_N_m"
+        return f"spheres were thrown out: {change}, {anew}"
     if any(line.startswith("ERROR") and "No space" not in line for line in bad):
-        return (
-            "the same deck would fail again: mend the case and start over with --force or "
-            "another --out"
-        )
+        return f"the same deck would fail again: mend the case {anew}"
     return "mend the cause and continue with --resume"
 
 

@@ -369,21 +369,13 @@ class LoadStep:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sheared:
-    """A finished triaxial test.
+    """A finished triaxial test."""
 
-    Attributes:
-        test: what was done.
-        rows: the pack after the confining stress, then after each load step.
-        pack: at the end.
-        bonds: number of bonds at the start.
-        restless: load steps that never came within the tolerance.
-    """
-
-    test: Triaxial
-    rows: tuple[LoadStep, ...]
-    pack: Deformed
-    bonds: int
-    restless: int
+    test: Triaxial  # what was done
+    rows: tuple[LoadStep, ...]  # the pack after the confining stress, then after each load step
+    pack: Deformed  # at the end
+    bonds: int  # number of bonds at the start
+    restless: int  # load steps that never came within the tolerance
 
     __repr__ = one_line
 
