@@ -161,12 +161,12 @@ class Pack:
     """A pack at rest, or nearly."""
 
     grains: Snapshot
-    porosity: float  # overlaps counted once, with its standard error
-    porosity_error: float
-    porosity_sum: float  # porosity by the plain sum of the spheres' volumes
+    porosity: float  # overlaps counted once
+    porosity_error: float  # its standard error
+    porosity_sum: float  # by the plain sum of the spheres' volumes
     max_overlap: float  # largest overlap of two grains over the smaller diameter
-    steps: int  # of the last attempt, of `step_s` s
-    step_s: float
+    steps: int  # of the last attempt
+    step_s: float  # s, time step
     attempts: tuple[dict[str, Any], ...]  # one row for each number of grains that was tried
     left_out: tuple[LeftOut, ...]  # what the deck does without
     run: Execution  # the execution of LIGGGHTS that made it

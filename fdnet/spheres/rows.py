@@ -42,8 +42,8 @@ class SphereRows:
     # what the file says of the sides across x, y and z ("pp", "ff"), else empty
     boundary: tuple[str, ...] = ()
     step: int = 0  # time step of the simulation, 0 without one
-    notes: tuple[str, ...] = ()  # what the reader assumed, and could not read, one sentence each
-    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what the reader assumed, one sentence each
+    warnings: tuple[str, ...] = ()  # what of the file could not be read, one sentence each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
