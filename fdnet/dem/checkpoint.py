@@ -431,10 +431,10 @@ def readable_states(
     scales: InvasionScales,
     grains: Snapshot,
 ) -> Iterator[tuple[Checkpoint, Snapshot]]:
-    """The states of the checkpoints in `history`, checked against its counts.
+    """The states of the checkpoints in `history`; LiggghtsError where its counts disagree.
 
     Dumps that are missing, cut or changed are passed over, except the last one, which raises
-    DumpError. Raises LiggghtsError when counts disagree.
+    DumpError.
     """
     batches, points = batches_of(case, scales), Checkpoints(folder=folder, digest="")
     for row in history:
