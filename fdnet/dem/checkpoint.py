@@ -36,26 +36,16 @@ _SUFFIXES = "dump|restart|npz|unreadable|record"
 
 
 class Checkpoint(NamedTuple):
-    """Numbers of fines after one chunk (from 1) of an invasion: a row of its history.csv.
+    """Numbers of fines after one chunk of an invasion: a row of its history.csv."""
 
-    Attributes:
-        step: last step of the chunk.
-        upstream: fines upstream of the face, with those that were removed there.
-        invaded: fines inside the specimen.
-        passed: fines that have left through the outlet.
-        removed_upstream: fines that bounced out upstream and were removed.
-        most_crossed: crossings when the clock of the stop rule last started.
-        quiet: chunks since then.
-    """
-
-    chunk: int
-    step: int
-    upstream: int
-    invaded: int
-    passed: int
-    removed_upstream: int
-    most_crossed: int
-    quiet: int
+    chunk: int  # from 1
+    step: int  # the last one of the chunk
+    upstream: int  # of the face, with those that were removed there
+    invaded: int  # inside the specimen
+    passed: int  # have left through the outlet
+    removed_upstream: int  # bounced out upstream and were removed
+    most_crossed: int  # crossings when the clock of the stop rule last started
+    quiet: int  # chunks since then
 
     @property
     def waiting(self) -> int:
@@ -64,63 +54,38 @@ class Checkpoint(NamedTuple):
 
 
 class Cleaned(NamedTuple):
-    """Numbers of fines after one chunk (from 1) of a clean-up: a row of its history.csv.
+    """Numbers of fines after one chunk of a clean-up: a row of its history.csv."""
 
-    Attributes:
-        step: last step of the chunk; it counts on from those of the invasion.
-        inside: fines inside the specimen.
-        out: fines that have come out since the clean-up began.
-        passed: fines that have left through the other end.
-        quiet: chunks since a fine came out.
-    """
-
-    chunk: int
-    step: int
-    inside: int
-    out: int
-    passed: int
-    quiet: int
+    chunk: int  # from 1
+    step: int  # the last one of the chunk; it counts on from those of the invasion
+    inside: int  # the specimen
+    out: int  # have come out since the clean-up began
+    passed: int  # have left through the other end
+    quiet: int  # chunks since a fine came out
 
 
 class Record(NamedTuple):
-    """What a checkpoint was when its files were whole, in SHA-256 but for `ranks`, `row`, `fdnet`.
+    """What a checkpoint was when its files were whole; digests are SHA-256."""
 
-    Attributes:
-        case: what the stage depends on.
-        ranks: MPI ranks of LIGGGHTS.
-        row: line of history.csv.
-        overlap: the overlaps that were watched since the checkpoint before.
-        updates: the updates of a coupled stage before the checkpoint.
-        fluid: what the fluid of a coupled stage remembers; "" where that is nothing.
-        fdnet: version of fdnet, whose forces these are; "" by a version that did not record it.
-    """
-
-    case: str
-    ranks: int
-    row: str
-    overlap: str
+    case: str  # what the stage depends on
+    ranks: int  # MPI ranks of LIGGGHTS
+    row: str  # line of history.csv
+    overlap: str  # what was watched since the checkpoint before
     dump: str
     restart: str
-    updates: str
-    fluid: str = ""
-    fdnet: str = ""
+    updates: str  # of a coupled stage, before the checkpoint
+    fluid: str = ""  # what the fluid of a coupled stage remembers, if there is any
+    fdnet: str = ""  # version, whose forces these are
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checkpoints:
-    """The checkpoints of a stage.
-
-    Attributes:
-        folder: of the stage.
-        digest: of what the stage depends on.
-        stage: what the names of its files begin with, "invade" or "clean".
-        kind: of the rows of its history.csv.
-    """
+    """The checkpoints of a stage in its folder."""
 
     folder: Path
-    digest: str
-    stage: str = "invade"
-    kind: type = Checkpoint
+    digest: str  # of what the stage depends on
+    stage: str = "invade"  # or "clean": what the names of its files begin with
+    kind: type = Checkpoint  # of the rows of its history.csv
 
     def path(self, step: int, suffix: str) -> Path:
         """The "dump", "restart" or "record" of a checkpoint."""
@@ -303,11 +268,7 @@ def read_history(folder: Path, kind: type = Checkpoint) -> tuple[Any, ...]:
 
 
 def chunks_of(case: InvasionCase, scales: InvasionScales) -> int:
-    """Number of chunks of the whole run.
-
-    With a duration it is the number that comes nearest to it, so that chunks rounded to whole
-    steps never make one too many. Otherwise it is enough to reach the cap.
-    """
+    """Number of chunks of the whole run: nearest to its duration, or enough to reach the cap."""
     chunks = scales.cap_time / (scales.checkpoint_steps * scales.time_step)
     return max(1, round(chunks) if case.run.duration_s is not None else math.ceil(chunks - 1e-9))
 
@@ -470,10 +431,10 @@ def readable_states(
     scales: InvasionScales,
     grains: Snapshot,
 ) -> Iterator[tuple[Checkpoint, Snapshot]]:
-    """The states of the checkpoints in `history`, checked against its counts.
+    """The states of the checkpoints in `history`; LiggghtsError where its counts disagree.
 
     Dumps that are missing, cut or changed are passed over, except the last one, which raises
-    DumpError. Raises LiggghtsError when counts disagree.
+    DumpError.
     """
     batches, points = batches_of(case, scales), Checkpoints(folder=folder, digest="")
     for row in history:
@@ -508,12 +469,7 @@ fifth of a step with contacts."""
 
 
 class Deepest(NamedTuple):
-    """The largest overlap of a fine with another sphere that was seen.
-
-    Attributes:
-        step: when it was measured.
-        fraction: over the smaller diameter.
-    """
+    """The largest overlap of a fine with another sphere, over the smaller diameter, at a step."""
 
     step: int
     fraction: float

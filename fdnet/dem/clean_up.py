@@ -28,19 +28,12 @@ from fdnet.spheres.snapshot import Array, Snapshot
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Start:
-    """What a clean-up begins with.
+    """What a clean-up begins with."""
 
-    Attributes:
-        grains: of the pack.
-        invaded: grains and all fines at the end of the invasion.
-        invasion: folder of the invasion.
-        digest: of the case's clean-up.
-    """
-
-    grains: Snapshot
-    invaded: Snapshot
-    invasion: Path
-    digest: str
+    grains: Snapshot  # of the pack
+    invaded: Snapshot  # grains and all fines at the end of the invasion
+    invasion: Path  # folder of the invasion
+    digest: str  # of the case's clean-up
 
 
 def cleaned_points(folder: Path, digest: str) -> Checkpoints:

@@ -44,46 +44,32 @@ GIVEN = ("f_uf[1]", "f_uf[2]", "f_uf[3]")
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FluidForces:
-    """What acts on N fines until they are looked at again.
+    """What acts on N fines until they are looked at again."""
 
-    Attributes:
-        coefficient: (N,) N s/m, C; above 0.
-        velocity: (N, 3) m/s, u.
-        push: (N, 3) N, P.
-        pace: m/s, speed with which the fines move on; it decides when they are looked at again.
-        measures: what the record of updates keeps, by the names of `DrivingFluid.measured`.
-    """
-
-    coefficient: Array
-    velocity: Array
-    push: Array
+    coefficient: Array  # (N,) N s/m, C; above 0
+    velocity: Array  # (N, 3) m/s, u
+    push: Array  # (N, 3) N, P
+    # m/s, speed with which the fines move on; it decides when they are looked at again
     pace: float
+    # what the record of updates keeps, by the names of `DrivingFluid.measured`
     measures: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Moment:
-    """When the fines are looked at.
-
-    Attributes:
-        step: of the simulation.
-        time: s, since the start.
-        before: the row of the update before this one; None for the first.
-        fresh: whether a chunk begins. What is answered then must follow from the spheres and the
-            row before alone, so that a run that was cut gives the same.
-        left: s, until the chunk ends, when they are looked at again in any case.
-        given: (N,) m/s, speed w at which each fine would go by the forces that it has now; 0 where
-            it has none yet. None where it is not known.
-        density: (N,) kg/m3 of each fine. None where all have that of the case.
-    """
+    """When the fines are looked at."""
 
     step: int
-    time: float
-    before: Mapping[str, float] | None
+    time: float  # s, since the start
+    before: Mapping[str, float] | None  # the row of the update before this one; None for the first
+    # whether a chunk begins. What is answered then must follow from the spheres and the row before
+    # alone, so that a run that was cut gives the same.
     fresh: bool
-    left: float = math.inf
+    left: float = math.inf  # s, until the chunk ends, when they are looked at again in any case
+    # (N,) m/s, speed w at which each fine would go by the forces that it has now; 0 where it has
+    # none yet. None where it is not known.
     given: Array | None = None
-    density: Array | None = None
+    density: Array | None = None  # (N,) kg/m3 of each fine. None where all have that of the case.
 
 
 class DrivingFluid(Protocol):

@@ -36,23 +36,16 @@ _START_OF_SCREEN = 1 << 20
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ChunkedStage(ABC):
-    """A stage that is run in chunks of steps.
-
-    Attributes:
-        grains: of the pack.
-        points: its checkpoints, in its folder.
-        launch: how LIGGGHTS is started.
-        fluid: answers for the fines of a coupled case; None where the deck holds the forces.
-        first_step: at which it begins.
-    """
+    """A stage that is run in chunks of steps."""
 
     case: InvasionCase
     scales: InvasionScales
-    grains: Snapshot
+    grains: Snapshot  # of the pack
     points: Checkpoints
-    launch: Launch
+    launch: Launch  # how LIGGGHTS is started
+    # answers for the fines of a coupled case; None where the deck holds the forces
     fluid: DrivingFluid | None = None
-    first_step: int = 0
+    first_step: int = 0  # at which it begins
 
     deck = "in.invade"
     """Name of the deck; that of a continued stage ends in .resume."""
@@ -235,27 +228,18 @@ def steps_between(case: InvasionCase, scales: InvasionScales, pace: float) -> in
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class EndedStage:
-    """A finished stage.
+    """A finished stage."""
 
-    Attributes:
-        state: grains and remaining fines at the end.
-        history: one row a checkpoint.
-        stop_reason: "duration" (what the case asks for has gone by), "cap", or that of the stage.
-        warnings: doubts about how it ended, one sentence each.
-        left_out: what the deck does without.
-        runs: executions of LIGGGHTS; empty when an earlier session had come to the end.
-        ranks: MPI ranks of them.
-        step_s: s, time step.
-    """
-
-    state: Snapshot
-    history: tuple[Any, ...]
+    state: Snapshot  # grains and remaining fines at the end
+    history: tuple[Any, ...]  # one row a checkpoint
+    # "duration" (what the case asks for has gone by), "cap", or that of the stage
     stop_reason: str
-    warnings: tuple[str, ...]
-    left_out: tuple[LeftOut, ...]
+    warnings: tuple[str, ...]  # doubts about how it ended, one sentence each
+    left_out: tuple[LeftOut, ...]  # what the deck does without
+    # executions of LIGGGHTS; empty when an earlier session had come to the end
     runs: tuple[Execution, ...]
-    ranks: int
-    step_s: float
+    ranks: int  # MPI ranks of them
+    step_s: float  # s, time step
 
 
 # ------------------------------------------------------------------------------------------------
@@ -266,17 +250,12 @@ class EndedStage:
 class Invasion(EndedStage):
     """A finished invasion; `stop_reason` is also "plugged", "supply_exhausted", "mud_cut_off",
     or "unfinished" of one that was cut.
-
-    Attributes:
-        supplied: number of fines that took part: all, or those of the batches that had come.
-        last: the scales of the last chunk: its step and its springs.
-        overlap: largest overlap of a fine with any sphere.
-        updates: the record of a coupled invasion, one row an update; empty when it is not coupled.
     """
 
-    supplied: int
-    last: InvasionScales
-    overlap: Deepest
+    supplied: int  # number of fines that took part: all, or those of the batches that had come
+    last: InvasionScales  # the scales of the last chunk: its step and its springs
+    overlap: Deepest  # largest overlap of a fine with any sphere
+    # the record of a coupled invasion, one row an update; empty when it is not coupled
     updates: tuple[Mapping[str, float], ...]
 
 

@@ -86,8 +86,7 @@ def verify(folder: Path, deck: str, code: int) -> None:
             )
         return
     evidence = bad[0] if bad else evidence
-    if disk_is_full(folder):
-        evidence = f"the disk is full ({evidence})"
+    evidence = f"the disk is full ({evidence})" if disk_is_full(folder) else evidence
     state = f"ended by signal {-code}" if code < 0 else f"exit {code}"
     finished = "" if bad else f", no {END_MARK} line"
     raise LiggghtsError(
@@ -98,16 +97,12 @@ def verify(folder: Path, deck: str, code: int) -> None:
 
 def _advice(bad: list[str]) -> str:
     """What helps: another case where it would happen again, --resume for causes outside."""
+    anew = "and start over with --force or another --out"
     if any("Lost atoms" in line for line in bad):
-        return (
-            "spheres were thrown out: lower run.time_step_factor or drag.multiplier, or raise "
-            "run.stiffness_N_m, and start over with --force or another --out"
-        )
+        change = "lower run.time_step_factor or drag.multiplier, or raise run.stiffness_N_m"
+        return f"spheres were thrown out: {change}, {anew}"
     if any(line.startswith("ERROR") and "No space" not in line for line in bad):
-        return (
-            "the same deck would fail again: mend the case and start over with --force or "
-            "another --out"
-        )
+        return f"the same deck would fail again: mend the case {anew}"
     return "mend the cause and continue with --resume"
 
 
@@ -203,16 +198,11 @@ _PROJECT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Binary:
-    """A LIGGGHTS that answers.
-
-    Attributes:
-        path: of the binary.
-        version: as it prints it.
-        launcher: words that start several ranks, `{ranks}` among them; None: one rank only.
-    """
+    """A LIGGGHTS that answers."""
 
     path: Path
-    version: str
+    version: str  # as it prints it
+    # words that start several ranks, `{ranks}` among them; None: one rank only
     launcher: tuple[str, ...] | None
 
     def command(self, deck: str | None, ranks: int) -> list[str]:
@@ -333,43 +323,28 @@ _PATIENCE = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Launch:
-    """How to run decks.
-
-    Attributes:
-        binary: LIGGGHTS.
-        ranks: MPI ranks.
-        deadline: s of the monotonic clock, when LIGGGHTS is stopped; None: never.
-        follow: is called with each new line that LIGGGHTS prints.
-    """
+    """How to run decks."""
 
     binary: Binary
-    ranks: int = 1
+    ranks: int = 1  # MPI ranks
+    # s of the monotonic clock, when LIGGGHTS is stopped; None: never
     deadline: float | None = None
+    # is called with each new line that LIGGGHTS prints
     follow: Callable[[str], None] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Execution:
-    """One run that really finished; there is none of a run that did not.
+    """One run that really finished; there is none of a run that did not."""
 
-    Attributes:
-        directory: folder that it ran in.
-        command: command line.
-        version: of LIGGGHTS.
-        seconds: s, from start to end.
-        ranks: MPI ranks.
-        waited: s, in which LIGGGHTS waited for fdnet to compute something.
-        cpu_seconds: s of processors, user and system, of LIGGGHTS on all ranks.
-        peak_memory_bytes: largest resident memory of LIGGGHTS; None on several ranks.
-    """
-
-    directory: Path
+    directory: Path  # folder that it ran in
     command: tuple[str, ...]
-    version: str
-    seconds: float
+    version: str  # of LIGGGHTS
+    seconds: float  # s, from start to end
     ranks: int
-    waited: float = 0.0
-    cpu_seconds: float = 0.0
+    waited: float = 0.0  # s, in which LIGGGHTS waited for fdnet to compute something
+    cpu_seconds: float = 0.0  # s of processors, user and system, of LIGGGHTS on all ranks
+    # largest resident memory of LIGGGHTS; None on several ranks
     peak_memory_bytes: int | None = None
 
 
@@ -379,27 +354,17 @@ class _EndedError(Exception):
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class Feed:
-    """A LIGGGHTS that waits for commands; call it with some, and it returns when they are done.
-
-    Attributes:
-        process: its process.
-        folder: that it runs in.
-        screen: takes what it prints.
-        launch: how it was started.
-        busy: s, that it has worked on the commands.
-        waited: s, in between.
-        usage: what the process and its children used, known when it has ended.
-        peak_memory_bytes: largest resident memory of the process so far.
-    """
+    """A LIGGGHTS that waits for commands; call it with some, and it returns when they are done."""
 
     process: subprocess.Popen
-    folder: Path
-    screen: IO[bytes]
-    launch: Launch
-    busy: float = 0.0
-    waited: float = 0.0
+    folder: Path  # that it runs in
+    screen: IO[bytes]  # takes what it prints
+    launch: Launch  # how it was started
+    busy: float = 0.0  # s, that it has worked on the commands
+    waited: float = 0.0  # s, in between
+    # what the process and its children used, known when it has ended
     usage: resource.struct_rusage | None = None
-    peak_memory_bytes: int = 0
+    peak_memory_bytes: int = 0  # largest resident memory of the process so far
     _fed: int = 0
     _rest: bytes = b""
 

@@ -158,31 +158,21 @@ accepted."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pack:
-    """A pack at rest, or nearly.
-
-    Attributes:
-        porosity: overlaps counted once, with its standard error.
-        porosity_sum: porosity by the plain sum of the spheres' volumes.
-        max_overlap: largest overlap of two grains over the smaller diameter.
-        steps: of the last attempt, of `step_s` s.
-        attempts: one row for each number of grains that was tried.
-        left_out: what the deck does without.
-        run: the execution of LIGGGHTS that made it.
-        creep: m/s, root-mean-square speed of grains that never came to rest; 0 for a pack at rest.
-        restless: packs that did not come to rest, before others from the next random places did.
-    """
+    """A pack at rest, or nearly."""
 
     grains: Snapshot
-    porosity: float
-    porosity_error: float
-    porosity_sum: float
-    max_overlap: float
-    steps: int
-    step_s: float
-    attempts: tuple[dict[str, Any], ...]
-    left_out: tuple[LeftOut, ...]
-    run: Execution
+    porosity: float  # overlaps counted once
+    porosity_error: float  # its standard error
+    porosity_sum: float  # by the plain sum of the spheres' volumes
+    max_overlap: float  # largest overlap of two grains over the smaller diameter
+    steps: int  # of the last attempt
+    step_s: float  # s, time step
+    attempts: tuple[dict[str, Any], ...]  # one row for each number of grains that was tried
+    left_out: tuple[LeftOut, ...]  # what the deck does without
+    run: Execution  # the execution of LIGGGHTS that made it
+    # m/s, root-mean-square speed of grains that never came to rest; 0 for a pack at rest
     creep: float
+    # packs that did not come to rest, before others from the next random places did
     restless: int = 0
 
 

@@ -297,16 +297,12 @@ def crowding(case: InvasionCase) -> float:
     """
     low, high = case.fines.radius_range_m
     if case.fines.measured:
-        one, two, three = (
-            case.fines.curve.mean(power) / (2 * high) ** power for power in (1, 2, 3)
-        )
+        curve, wide = case.fines.curve, 2 * high
+        one, two, three = (curve.mean(power) / wide**power for power in (1, 2, 3))
         shut = (1 + 3 * one + 3 * two + three) / (8 * three)
     else:
-        shut = (
-            (2 * high + low + high)
-            * ((2 * high) ** 2 + (low + high) ** 2)
-            / (8 * (low + high) * (low**2 + high**2))
-        )
+        above = (2 * high + low + high) * ((2 * high) ** 2 + (low + high) ** 2)
+        shut = above / (8 * (low + high) * (low**2 + high**2))
     sides = zip(case.size_m[1:], case.periodic[1:], strict=True)
     reach = [1.0 if periodic else 1 - 2 * high / side for side, periodic in sides]
     return case.fines.placed_fraction * shut / math.prod(reach) if min(reach) > 0 else math.inf

@@ -23,15 +23,10 @@ does not carry."""
 
 @dataclass(frozen=True, slots=True)
 class Moduli:
-    """Elastic constants of an isotropic material, Pa.
+    """Elastic constants of an isotropic material, Pa."""
 
-    Attributes:
-        bulk: K.
-        shear: G.
-    """
-
-    bulk: float
-    shear: float
+    bulk: float  # K
+    shear: float  # G
 
     @property
     def young(self) -> float:

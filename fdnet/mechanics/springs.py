@@ -21,25 +21,17 @@ CONTACT_GAP = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Joints:
-    """K joints between N grains.
+    """K joints between N grains."""
 
-    Attributes:
-        first: (K,) index of a grain.
-        second: (K,) index of the other grain, `WALL` for a wall.
-        overlap: (K,) m; a negative one is a gap.
-        normal: (K, 3) unit vector from the first grain to the second, or into the wall.
-        arm_first, arm_second: (K, 3) m, from the centre of each grain to the point of contact; the
-            second is zero for a wall.
-        radius: (K,) m, of the smaller of the two grains.
-    """
-
-    first: Array
-    second: Array
-    overlap: Array
-    normal: Array
+    first: Array  # (K,) index of a grain
+    second: Array  # (K,) index of the other grain, `WALL` for a wall
+    overlap: Array  # (K,) m; a negative one is a gap
+    normal: Array  # (K, 3) unit vector from the first grain to the second, or into the wall
+    # (K, 3) m, from the centre of each grain to the point of contact; the second is zero for a
+    # wall
     arm_first: Array
     arm_second: Array
-    radius: Array
+    radius: Array  # (K,) m, of the smaller of the two grains
 
     def __len__(self) -> int:
         return len(self.first)
@@ -131,19 +123,12 @@ STRAINS = ("xx", "yy", "zz", "yz", "xz", "xy")
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Kinematics:
-    """Linear maps to the displacements in K joints, six a joint, in each joint's frame.
+    """Linear maps to the displacements in K joints, six a joint, in each joint's frame."""
 
-    Attributes:
-        of_grains: (6 K, 6 N) sparse, from the motion of the grains.
-        of_strain: (6 K, 6), m, from a uniform strain in the order of `STRAINS`.
-        frame: (K, 3, 3) normal and two tangents of each joint.
-        length: m, that turns a rotation into a degree of freedom.
-    """
-
-    of_grains: sparse.csr_matrix
-    of_strain: Array
-    frame: Array
-    length: float
+    of_grains: sparse.csr_matrix  # (6 K, 6 N) sparse, from the motion of the grains
+    of_strain: Array  # (6 K, 6), m, from a uniform strain in the order of `STRAINS`
+    frame: Array  # (K, 3, 3) normal and two tangents of each joint
+    length: float  # m, that turns a rotation into a degree of freedom
 
 
 def kinematics(joints: Joints, count: int, *, length: float) -> Kinematics:
@@ -203,46 +188,27 @@ def _of_strain(frame: Array, branch: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cement:
-    """Parallel bonds, as a case gives them, in SI.
+    """Parallel bonds, as a case gives them, in SI."""
 
-    Attributes:
-        radius_ratio: radius of the disc over that of the smaller grain.
-        normal: normal stiffness per area, Pa/m.
-        shear: shear stiffness per area, Pa/m.
-        tensile_strength: Pa; infinite: the bonds never break.
-        shear_strength: Pa; infinite: the bonds never break.
-        gap_ratio: widest gap that is bridged, over the smaller diameter.
-    """
-
-    radius_ratio: float
-    normal: float
-    shear: float
-    tensile_strength: float = np.inf
-    shear_strength: float = np.inf
-    gap_ratio: float = 0.01
+    radius_ratio: float  # radius of the disc over that of the smaller grain
+    normal: float  # normal stiffness per area, Pa/m
+    shear: float  # shear stiffness per area, Pa/m
+    tensile_strength: float = np.inf  # Pa; infinite: the bonds never break
+    shear_strength: float = np.inf  # Pa; infinite: the bonds never break
+    gap_ratio: float = 0.01  # widest gap that is bridged, over the smaller diameter
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PackMaterial:
-    """How grains act on each other, in SI.
+    """How grains act on each other, in SI."""
 
-    Attributes:
-        normal: normal stiffness of a contact of two grains, N/m.
-        shear: tangential stiffness of such a contact, N/m.
-        friction: coefficient of sliding friction of two grains.
-        wall_friction: of a grain and a wall.
-        glued: whether grains stick to the walls, as to the plates of an elastic test.
-        density: of the solid, kg/m3.
-        cement: of the bonds; None without.
-    """
-
-    normal: float
-    shear: float
-    friction: float = 0.55
-    wall_friction: float = 0.0
-    glued: bool = True
-    density: float = 2650.0
-    cement: Cement | None = None
+    normal: float  # normal stiffness of a contact of two grains, N/m
+    shear: float  # tangential stiffness of such a contact, N/m
+    friction: float = 0.55  # coefficient of sliding friction of two grains
+    wall_friction: float = 0.0  # of a grain and a wall
+    glued: bool = True  # whether grains stick to the walls, as to the plates of an elastic test
+    density: float = 2650.0  # of the solid, kg/m3
+    cement: Cement | None = None  # of the bonds; None without
 
     @property
     def gap(self) -> float:

@@ -17,21 +17,13 @@ SOUND, TENSION, SHEAR = 0, 1, 2
 
 
 class Memory(NamedTuple):
-    """What K joints remember.
+    """What K joints remember."""
 
-    Attributes:
-        rest: (K,) m, overlap at which the contact bears nothing.
-        shear: (K, 3) tangential force of the contact, N.
-        bond: (K, 6) force and moment of the bond, N and N m, along x, y, z.
-        bonded: (K,) whether there was a bond.
-        broken: (K,) `SOUND`, `TENSION` or `SHEAR`.
-    """
-
-    rest: Array
-    shear: Array
-    bond: Array
-    bonded: Array
-    broken: Array
+    rest: Array  # (K,) m, overlap at which the contact bears nothing
+    shear: Array  # (K, 3) tangential force of the contact, N
+    bond: Array  # (K, 6) force and moment of the bond, N and N m, along x, y, z
+    bonded: Array  # (K,) whether there was a bond
+    broken: Array  # (K,) `SOUND`, `TENSION` or `SHEAR`
 
     @property
     def whole(self) -> Array:
@@ -41,19 +33,12 @@ class Memory(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Deformed:
-    """A pack under load.
-
-    Attributes:
-        grains: where the grains and the faces of the box are.
-        key: (M,) numbers of the joints that remember something, sorted; see `keys_of`.
-        memory: of these joints.
-        strain: (3,) of the box since the start, logarithmic; compression is below 0.
-    """
+    """A pack under load, where its grains and the faces of its box are."""
 
     grains: Snapshot
-    key: Array
-    memory: Memory
-    strain: Array
+    key: Array  # (M,) numbers of the joints that remember something, sorted; see `keys_of`
+    memory: Memory  # of these joints
+    strain: Array  # (3,) of the box since the start, logarithmic; compression is below 0
 
 
 def at_rest(
@@ -103,33 +88,19 @@ NEWTON_STEPS, _HALVES = 12, 12
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LoadedPack:
-    """A pack as one step sees it.
+    """A pack as one step sees it."""
 
-    Attributes:
-        pack: before the step.
-        material: of its contacts and bonds.
-        joints: K joints, also across gaps that may close.
-        maps: to the displacements in the joints.
-        memory: of the joints.
-        overlap: (K,) m, from which the contact bears.
-        held: (K, 2) tangential force before the step, N, in the frame of the joint.
-        bond: (K, 6) force of the bond before the step, in the frame.
-        springs: (K, 6) of the bonds.
-        limit: (K,) largest tangential force, N.
-        volume: m3.
-    """
-
-    pack: Deformed
+    pack: Deformed  # before the step
     material: PackMaterial
-    joints: Joints
-    maps: Kinematics
-    memory: Memory
-    overlap: Array
-    held: Array
-    bond: Array
-    springs: Array
-    limit: Array
-    volume: float
+    joints: Joints  # K joints, also across gaps that may close
+    maps: Kinematics  # to the displacements in the joints
+    memory: Memory  # of the joints
+    overlap: Array  # (K,) m, from which the contact bears
+    held: Array  # (K, 2) tangential force before the step, N, in the frame of the joint
+    bond: Array  # (K, 6) force of the bond before the step, in the frame
+    springs: Array  # (K, 6) of the bonds
+    limit: Array  # (K,) largest tangential force, N
+    volume: float  # m3
 
     def moves(self, motion: Array, strain: Array) -> Array:
         """Displacements (K, 6) in the joints by a motion (6 N,) and a strain (3,)."""
@@ -139,39 +110,23 @@ class LoadedPack:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class JointForces:
-    """What K joints bear.
+    """What K joints bear."""
 
-    Attributes:
-        total: (K, 6) N and N m, in the frame of the joint, tension above 0.
-        tangent: (K, 6, 6) stiffness of the state, N/m and N m.
-        normal: (K,) compression of the contact, N.
-        shear: (K, 2) of the contact, N.
-        bond: (K, 6) of the bond.
-        sliding: (K,) whether the contact slides.
-    """
-
-    total: Array
-    tangent: Array
-    normal: Array
-    shear: Array
-    bond: Array
-    sliding: Array
+    total: Array  # (K, 6) N and N m, in the frame of the joint, tension above 0
+    tangent: Array  # (K, 6, 6) stiffness of the state, N/m and N m
+    normal: Array  # (K,) compression of the contact, N
+    shear: Array  # (K, 2) of the contact, N
+    bond: Array  # (K, 6) of the bond
+    sliding: Array  # (K,) whether the contact slides
 
 
 class Load(NamedTuple):
-    """What is asked of one step.
+    """What is asked of one step."""
 
-    Attributes:
-        strain: (3,) strain along x, y, z where it is given; nan where the stress is.
-        stress: (3,) stress, Pa, compression below 0; used where the strain is nan.
-        drag: N/m, on the motion of the grains relative to the strain.
-        within: N, norm of the missing forces at which the step is done.
-    """
-
-    strain: Array
-    stress: Array
-    drag: float
-    within: float
+    strain: Array  # (3,) strain along x, y, z where it is given; nan where the stress is
+    stress: Array  # (3,) stress, Pa, compression below 0; used where the strain is nan
+    drag: float  # N/m, on the motion of the grains relative to the strain
+    within: float  # N, norm of the missing forces at which the step is done
 
 
 def loaded_pack(
@@ -380,49 +335,31 @@ PROBE = 0.1
 class Triaxial:
     """What a triaxial test does.
 
-    Attributes:
-        confining: stress on the sides, Pa.
-        strain: axial strain at the end, compression above 0.
-        steps: load steps to that strain.
-        tolerance: largest unbalanced force over the mean force of a contact, and the largest
-            change of the axial stress between two steps at rest, over the stress.
-        relieved: whether the overlaps of the pack are its state without stress.
+    `tolerance` is the largest unbalanced force over the mean force of a contact, and the largest
+    change of the axial stress between two steps at rest, over the stress.
     """
 
-    confining: float
-    strain: float = 0.02
-    steps: int = 40
+    confining: float  # stress on the sides, Pa
+    strain: float = 0.02  # axial, at the end; compression above 0
+    steps: int = 40  # load steps to that strain
     tolerance: float = 1e-2
-    relieved: bool = True
+    relieved: bool = True  # whether the overlaps of the pack are its state without stress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoadStep:
-    """The pack at rest after one load step; stresses in Pa, compression above 0.
+    """The pack at rest after one load step; stresses in Pa, compression above 0."""
 
-    Attributes:
-        axial_strain: logarithmic, since the confining stress was reached.
-        volume_strain: the same of the volume; compression above 0.
-        axial: stress along x.
-        side: mean stress along y and z.
-        tension: bonds broken in tension so far.
-        shear: bonds broken in shear so far.
-        contacts: closed contacts of two grains over grains.
-        sliding: share of the closed contacts that slide.
-        unbalanced: largest unbalanced force over the mean contact force.
-        rests: steps that it took.
-    """
-
-    axial_strain: float
-    volume_strain: float
-    axial: float
-    side: float
-    tension: int
-    shear: int
-    contacts: float
-    sliding: float
-    unbalanced: float
-    rests: int
+    axial_strain: float  # logarithmic, since the confining stress was reached
+    volume_strain: float  # the same of the volume
+    axial: float  # stress along x
+    side: float  # mean stress along y and z
+    tension: int  # bonds broken in tension so far
+    shear: int  # bonds broken in shear so far
+    contacts: float  # closed contacts of two grains over grains
+    sliding: float  # share of the closed contacts that slide
+    unbalanced: float  # largest unbalanced force over the mean contact force
+    rests: int  # steps that it took
 
     @property
     def deviatoric(self) -> float:
@@ -432,21 +369,13 @@ class LoadStep:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sheared:
-    """A finished triaxial test.
+    """A finished triaxial test."""
 
-    Attributes:
-        test: what was done.
-        rows: the pack after the confining stress, then after each load step.
-        pack: at the end.
-        bonds: number of bonds at the start.
-        restless: load steps that never came within the tolerance.
-    """
-
-    test: Triaxial
-    rows: tuple[LoadStep, ...]
-    pack: Deformed
-    bonds: int
-    restless: int
+    test: Triaxial  # what was done
+    rows: tuple[LoadStep, ...]  # the pack after the confining stress, then after each load step
+    pack: Deformed  # at the end
+    bonds: int  # number of bonds at the start
+    restless: int  # load steps that never came within the tolerance
 
     __repr__ = one_line
 

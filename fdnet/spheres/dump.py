@@ -25,19 +25,12 @@ _ITEMS = (b"ITEM: TIMESTEP", b"ITEM: NUMBER OF ATOMS", b"ITEM: BOX BOUNDS", b"IT
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Frame:
-    """One frame of a dump, in the units of the dump.
+    """One frame of a dump, in the units of the dump."""
 
-    Attributes:
-        step: time step of the simulation.
-        box: (3, 2) bounds of the simulation box.
-        columns: names of the C columns.
-        rows: (N, C) values, sorted by the column id where there is one.
-    """
-
-    step: int
-    box: Array
-    columns: tuple[str, ...]
-    rows: Array
+    step: int  # time step of the simulation
+    box: Array  # (3, 2) bounds of the simulation box
+    columns: tuple[str, ...]  # names of the C columns
+    rows: Array  # (N, C) values, sorted by the column id where there is one
 
     __repr__ = one_line
 
@@ -96,25 +89,17 @@ def parse_dump(data: bytes, source: str) -> Iterator[Frame]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Head:
-    """What stands before the rows of a frame, and where they stand.
+    """What stands before the rows of a frame, and where they stand."""
 
-    Attributes:
-        step, box, columns: as those of a `Frame`.
-        units: name of the units that the dump gives ("si", "lj"), empty where it gives none.
-        boundary: what the file says of the sides across x, y and z ("pp", "ff"), else empty.
-        count: number of rows.
-        body: where the rows stand in the bytes.
-        line: line of the first of them.
-    """
-
-    step: int
+    step: int  # as those of a `Frame`
     box: list[list[float]]
     columns: tuple[str, ...]
-    units: str
+    units: str  # name of the units that the dump gives ("si", "lj"), empty where it gives none
+    # what the file says of the sides across x, y and z ("pp", "ff"), else empty
     boundary: tuple[str, ...]
-    count: int
-    body: slice
-    line: int
+    count: int  # number of rows
+    body: slice  # where the rows stand in the bytes
+    line: int  # line of the first of them
 
 
 class DumpReader:

@@ -154,19 +154,13 @@ INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE = 0, 1, 2, 3
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Images:
-    """M images, the spheres themselves among them.
+    """M images, the spheres themselves among them."""
 
-    Attributes:
-        owner: (M,) index of the sphere.
-        position: (M, 3) centres, m.
-        shift: (M, 3) number of periods along each axis.
-        mirror: (M, 3) INSIDE, MIRROR_LOW or MIRROR_HIGH along each axis; ON_FACE for a centre on
-            or beyond a face, which has no mirror image across that axis.
-    """
-
-    owner: Array
-    position: Array
-    shift: Array
+    owner: Array  # (M,) index of the sphere
+    position: Array  # (M, 3) centres, m
+    shift: Array  # (M, 3) number of periods along each axis
+    # (M, 3) INSIDE, MIRROR_LOW or MIRROR_HIGH along each axis; ON_FACE for a centre on or beyond a
+    # face, which has no mirror image across that axis
     mirror: Array
 
 
@@ -288,21 +282,13 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Porosity:
-    """Porosity of a box of spheres, all values between 0 and 1.
+    """Porosity of a box of spheres, all values between 0 and 1."""
 
-    Attributes:
-        mean: porosity with the overlap of spheres counted once.
-        standard_error: of `mean`.
-        edges: (B+1,) edges of the bins of depth, m.
-        profile: (B,) porosity of each bin, overlap counted once.
-        sum: 1 - volumes of the spheres centred in the box / its volume.
-    """
-
-    mean: float
-    standard_error: float
-    edges: Array
-    profile: Array
-    sum: float
+    mean: float  # porosity with the overlap of spheres counted once
+    standard_error: float  # of `mean`
+    edges: Array  # (B+1,) edges of the bins of depth, m
+    profile: Array  # (B,) porosity of each bin, overlap counted once
+    sum: float  # 1 - volumes of the spheres centred in the box / its volume
 
     __repr__ = one_line
 

@@ -44,13 +44,8 @@ def write_spheres(path: str | Path, spheres: Snapshot) -> Path:
 
 
 def table_rows(data: bytes, source: str, *, units: str | None = None) -> SphereRows:
-    """The spheres of a table in text, in metres.
+    """The spheres of a table in text, in metres; `read_spheres` says what it may look like.
 
-    Columns stand between commas, semicolons, tabs or spaces, in any order: the centre x, y, z, a
-    size (radius, r, diameter or d) and, if there, kind (grain or fine), type and id; others are
-    not read. Lengths are in `units` (one of `UNITS`), or in the unit at the end of their names
-    ("x_m"), where `units` must be None. Names may also stand in the comment before the first row,
-    as Yade writes them (`#format x_y_z_r`); four columns without any name are x, y, z and radius.
     Blank lines and lines that start with `#` are skipped. Raises CaseError that names the file,
     the line, what it holds and what was expected.
     """
@@ -167,9 +162,7 @@ def dump_spheres(
 ) -> SphereRows:
     """The spheres of one frame of a dump, in metres: the last whole frame, or the one of `step`.
 
-    Columns: x y z (or xu yu zu, or xs ys zs or xsu ysu zsu in parts of the box), radius or
-    diameter, and type and id if they are there; others are not read. `units` is the unit of length
-    of the dump. Without it the unit is that of the dump's own unit system, or m where it names
+    Without `units` the unit of length is that of the dump's own unit system, or m where it names
     none. Raises DumpError where the file is malformed or holds no whole frame, CaseError where
     `step`, a column or the unit is missing.
     """
@@ -209,10 +202,7 @@ def dump_spheres(
 
 
 def _heads(reader: DumpReader) -> tuple[list[Head], list[DumpError]]:
-    """The whole frames, and of each frame that is cut what is wrong with it.
-
-    Raises DumpError where all are cut.
-    """
+    """The whole frames, and what is wrong with each that is cut. Raises where all are."""
     heads, cut = [], []
     while reader.goes_on():
         before = reader.position
@@ -251,18 +241,13 @@ _SAME_BOX = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SphereFile:
-    """What a file of spheres holds.
+    """What a file of spheres holds."""
 
-    Attributes:
-        spheres: the spheres, SI units.
-        assumptions: what the reader assumed where neither the file nor the caller says it.
-        around_grains: whether the box is the one around all grains, for want of another.
-        warnings: what is wrong with the file or contradicts it, one sentence each.
-    """
-
-    spheres: Snapshot
+    spheres: Snapshot  # the spheres, SI units
+    # what the reader assumed where neither the file nor the caller says it
     assumptions: tuple[str, ...]
-    around_grains: bool
+    around_grains: bool  # whether the box is the one around all grains, for want of another
+    # what is wrong with the file or contradicts it, one sentence each
     warnings: tuple[str, ...] = ()
 
     @property
@@ -425,10 +410,7 @@ def _read_rows(path: str | Path, units: str | None, step: int | None) -> SphereR
 def _kinds(
     rows: SphereRows, fines_below: float | None, types: Mapping[int, str] | None
 ) -> tuple[Array, list[str]]:
-    """Kind (N,) of each sphere, and what was assumed.
-
-    Raises CaseError on choices that contradict each other.
-    """
+    """Kind (N,) of each sphere, and what was assumed. Raises CaseError on choices at odds."""
     if fines_below is not None:
         return _by_radius(rows, fines_below, types), []
     if types is not None:

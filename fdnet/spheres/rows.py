@@ -28,53 +28,35 @@ _LARGEST_WHOLE = 2.0**53
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SphereRows:
-    """N spheres of a file, in metres.
+    """N spheres of a file, in metres."""
 
-    Attributes:
-        source: name of the file.
-        scale: metres in the unit of the file.
-        position: (N, 3) centres, m.
-        radius: (N,) m.
-        kind, type, id: (N,) int64 of `Kind`, atom types and numbers, where the file has them.
-        box: (3, 2) bounds that the file gives, m, else None.
-        boundary: what the file says of the sides across x, y and z ("pp", "ff"), else empty.
-        step: time step of the simulation, 0 without one.
-        notes, warnings: what the reader assumed, and could not read, one sentence each.
-    """
-
-    source: str
-    scale: float
-    position: Array
-    radius: Array
+    source: str  # name of the file
+    scale: float  # metres in the unit of the file
+    position: Array  # (N, 3) centres, m
+    radius: Array  # (N,) m
+    # (N,) int64 of `Kind`, atom types and numbers, where the file has them
     kind: Array | None = None
     type: Array | None = None
     id: Array | None = None
-    box: Array | None = None
+    box: Array | None = None  # (3, 2) bounds that the file gives, m, else None
+    # what the file says of the sides across x, y and z ("pp", "ff"), else empty
     boundary: tuple[str, ...] = ()
-    step: int = 0
-    notes: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    step: int = 0  # time step of the simulation, 0 without one
+    notes: tuple[str, ...] = ()  # what the reader assumed, one sentence each
+    warnings: tuple[str, ...] = ()  # what of the file could not be read, one sentence each
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Columns:
-    """Which columns of a file say what.
+    """Which columns of a file say what."""
 
-    Attributes:
-        names: names of all columns as the file has them.
-        place: indices of the centres along x, y, z.
-        scaled: whether the centres are in parts of the box.
-        radius: indices of the columns of sizes, each with the factor that makes radii of it.
-        others: index of each of kind, type and id that is there.
-        unit: unit of length that the names carry, None without one.
-    """
-
-    names: tuple[str, ...]
-    place: tuple[int, ...]
-    scaled: bool
+    names: tuple[str, ...]  # names of all columns as the file has them
+    place: tuple[int, ...]  # indices of the centres along x, y, z
+    scaled: bool  # whether the centres are in parts of the box
+    # indices of the columns of sizes, each with the factor that makes radii of it
     radius: dict[int, float]
-    others: dict[str, int]
-    unit: str | None
+    others: dict[str, int]  # index of each of kind, type and id that is there
+    unit: str | None  # unit of length that the names carry, None without one
 
     @property
     def needed(self) -> tuple[int, ...]:

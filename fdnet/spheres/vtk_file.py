@@ -29,12 +29,9 @@ _MEMORY, _GROWTH = 2**30, 20
 
 
 def vtk_spheres(data: bytes, source: str, *, units: str | None = None) -> SphereRows:
-    """The spheres of a .vtp, .vtu or legacy .vtk file, in metres.
+    """The spheres of a .vtp, .vtu or legacy .vtk file, in metres; `kind` is 1 or 2 there.
 
-    The centres are its points; the point data are a size by any of the names of `RADII`, and, if
-    there, `kind` (1 grain, 2 fine), `type` and `id`. `units` is the unit of length of the file, m
-    without it; where the name of the size carries a unit (radius_m) there is none to give. Raises
-    CaseError where the file cannot be read, is empty, or holds no or impossible values.
+    Raises CaseError where the file cannot be read, is empty, or holds no or impossible values.
     """
     arrays = _read_apart(data, source)
     points = arrays.pop("points")

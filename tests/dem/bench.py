@@ -51,20 +51,10 @@ def bench(
 ) -> list[Frame]:
     """Frames of N spheres with the contacts of `case`, one in `every` so many of the `steps`.
 
-    Args:
-        case: whose contacts count.
-        spheres: with their velocities; the first ones are grains.
-        folder: of the LIGGGHTS run, made here.
-        density: of each sphere or of all, kg/m3.
-        step: time step, s.
-        steps: length of the run.
-        every: steps from frame to frame; each holds all spheres by id, with their forces.
-        commands: further lines of the deck.
-        moving: the group that is integrated.
-        friction: whether contacts have it.
-        walls: ids of the side walls that stand, for example "wz0".
-        bounds: (3, 2) m of the simulation box; that of the spheres without it.
-        boundary: of the box.
+    The first spheres are grains; all come with their velocities. `density` kg/m3 is of each or of
+    all, `step` s, `bounds` (3, 2) m that of the spheres where there is none. `commands` are
+    further lines of the deck, `moving` is the group that is integrated, and `walls` are the ids
+    of the side walls that stand ("wz0"). A frame holds all spheres by id, with their forces.
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_data(

@@ -52,12 +52,18 @@ def test_broken_files_are_named_by_line_and_step(tmp_path: Path):
         (frame(0, ["1 1 0.5 ", "2 1 0.5 7 "]), "4 values, expected 3"),
         (frame(0, ["1 1 nan "]), "column x holds 'nan', expected a finite number"),
         (frame(0, ["1 1 0.5 ", "2 1 -inf "]), "d.dump:11: step 0: column x holds '-inf'"),
-        (frame(0, ["1 1 abc "]), "column x holds 'abc'"),
+        *(
+            (frame(0, [f"1 1 {x} "]), f"column x holds '{x}'")
+            for x in ("abc", "1e400", "1e", "1_0")
+        ),
         ("ITEM: TIMESTEP\n12\nITEM: NUMBER OF", "the file ends in the middle of a line"),
         ("ITEM: TIMESTEP\n12\n", "the file ends before ITEM: NUMBER OF ATOMS"),
         ("ITEM: TIMESTEP\nx\nITEM: NUMBER OF ATOMS\n", "step is 'x'"),
         ("hello\n", "'hello', expected 'ITEM: TIMESTEP'"),
-        (frame(0, ["1 1 1 "]).replace("0 2", "0"), "box bounds '0', expected two numbers"),
+        *(
+            (frame(0, ["1 1 1 "]).replace("0 2", two), f"d.dump:7: .*bounds '{two}', expected two")
+            for two in ("0", "nan nan", "0 inf", "1 0", "0 0", "0 1 2")
+        ),
         (
             frame(0, ["1 1 1 "]).replace("\n1\nITEM: BOX", "\n-4\nITEM: BOX"),
             "number of atoms is '-4'",

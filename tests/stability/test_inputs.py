@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from fdnet.cli import main
-from fdnet.errors import CaseError, DumpError
-from fdnet.spheres.dump import parse_dump
+from fdnet.errors import CaseError
 from tests.network.packs import random_pack, snapshot
 
 UNIT = ("--units", "mm", "--box", "0,4,0,4,0,4")
@@ -55,32 +54,6 @@ def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(
         if code == 0:
             warnings = json.loads(out)["warnings"]
             assert any("1 grains lie outside the box" in one for one in warnings)
-
-
-def frame(*, step="0", count="2", bounds="0 1", rows=("1 1 0.5 ", "2 1 0.25 ")) -> bytes:
-    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n"
-    return (
-        head
-        + f"{bounds}\n0 1\n0 1\nITEM: ATOMS id type x \n"
-        + "".join(f"{row}\n" for row in rows)
-    ).encode()
-
-
-def test_numbers_that_are_none_in_a_dump_are_named_with_line_and_column():
-    texts = ["nan", "NaN", "inf", "-inf", "1e400", "-nan", "Infinity", "nan(0x1)", "", "1e"]
-    for text in texts:
-        with pytest.raises(
-            DumpError, match=r"d:11: step 0: (column x holds|2 values, expected 3)"
-        ):
-            list(parse_dump(frame(rows=("1 1 0.5 ", f"2 1 {text} ")), "d"))
-
-
-def test_bounds_that_bound_nothing_are_refused():
-    for bounds in ("nan nan", "0 inf", "-inf 1", "1 0", "0 0", "0 1 2", "0", ""):
-        with pytest.raises(
-            DumpError, match=r"d:6: step 0: box bounds .* two numbers, the lower one first"
-        ):
-            list(parse_dump(frame(bounds=bounds), "d"))
 
 
 @pytest.mark.parametrize("name", ["position", "radius", "box"])
