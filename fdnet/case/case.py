@@ -591,6 +591,14 @@ def cross_problems(tables: Mapping[str, Any], bad: Collection[str] = ()) -> Iter
                 "cake: the table belongs to invasion.method = 'network' or 'both'; with spheres "
                 "alone the cake is that of the fines that LIGGGHTS moves; leave it out"
             )
+    if good("invasion.release_stress_Pa", "invasion.release_time_s"):
+        stress, time = invasion.release_stress_Pa, invasion.release_time_s
+        if (stress is None) != (time is None):
+            lacking = "release_time_s" if time is None else "release_stress_Pa"
+            yield (
+                f"invasion.{lacking}: is missing, expected with the other key of the release; "
+                "give both, or none"
+            )
     if by_classes and given("clean_up.drawdown_MPa"):
         yield (
             f"clean_up: with invasion.method = {invasion.method!r} nothing turns the flow back; "

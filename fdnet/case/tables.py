@@ -468,6 +468,11 @@ class InvasionChoices(Part):
     """Size classes, equal over the logarithm of the diameter."""
     sticking: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Share of the contacts of fines with grains that stick; 0 leaves attachment out."""
+    release_stress_Pa: Positive | None = None
+    """Wall stress of a throat above which the flow lifts what is held in throats and sticks to
+    grains. When absent: what is held stays."""
+    release_time_s: Positive | None = None
+    """Time in which it lifts all but 1/e, with `invasion.release_stress`."""
 
 
 class MudCake(Part):
