@@ -469,6 +469,10 @@ def _of_the_invasion(known: Known) -> Iterator[str]:
             "cake: the table belongs to invasion.method = 'network' or 'both'; leave it out, for "
             "spheres make their own cake"
         )
+    pair = ("release_stress_Pa", "release_time_s")
+    lacking = [key for key in pair if known.value(f"invasion.{key}") is None]
+    if known.good(*(f"invasion.{key}" for key in pair)) and len(lacking) == 1:
+        yield f"invasion.{lacking[0]}: is missing, expected with the other key of the release"
     if by_classes and known.given("clean_up.drawdown_MPa"):
         yield (
             f"clean_up: with invasion.method = {method!r} nothing turns the flow back; leave the "

@@ -396,6 +396,11 @@ class InvasionChoices(Part):
     """Number of size classes, equal over ln d."""
     sticking: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Share of the contacts of fines with grains that stick."""
+    release_stress_Pa: Positive | None = None
+    """Wall stress of a throat above which the flow lifts what is held in throats and sticks to
+    grains. When absent: what is held stays."""
+    release_time_s: Positive | None = None
+    """Time in which it lifts all but 1/e, with `invasion.release_stress`."""
 
 
 class MudCake(Part):

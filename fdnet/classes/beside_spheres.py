@@ -22,15 +22,17 @@ from fdnet.case.case import InvasionCase
 from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient, mud_classes
 from fdnet.classes.deposit import (
     Deposits,
+    Release,
     Sieve,
     advanced,
     holding,
     kept_shares,
     no_solids,
+    released,
     sieve_of,
     thickness_of_cake,
 )
-from fdnet.classes.invasion import bed_of, cake_permeability, cake_resistance
+from fdnet.classes.invasion import bed_of, cake_permeability, cake_resistance, release_of
 from fdnet.classes.transport import streams_of
 from fdnet.files import replacing
 from fdnet.network.flow.flow import Flow
@@ -98,6 +100,7 @@ class FinerClasses:
         classes: (C) and, as the last one, the spheres.
         bed: grains and fluid, for what sticks to them.
         sticking: share of the contacts with grains that stick.
+        release: what the flow lifts; None: nothing.
         mud: m3 that come at most.
         cake: m2, permeability of the cake of classes, where the case gives it.
         solids: of the classes (C).
@@ -112,6 +115,7 @@ class FinerClasses:
     classes: SizeClasses
     bed: Bed
     sticking: float
+    release: Release | None
     mud: float
     cake: float | None
     solids: Deposits
@@ -136,6 +140,10 @@ class FinerClasses:
             bed = replace(self.bed, velocity=passed.velocity)
             sticks = filter_coefficient(classes, bed, self.sticking)
             what = holding(sieve, solids, classes, streams, sticks)
+            if self.release and streams.inflow > 0 and passed.velocity > 0:
+                rate = passed.velocity * sieve.area
+                drop = bed.viscosity * rate / streams.inflow
+                solids = released(sieve, solids, streams, drop, step / rate, self.release)
             _, after = advanced(sieve, solids, classes, streams, what, step)
             self.solids = Deposits(
                 **{one.name: getattr(after, one.name)[..., :-1] for one in fields(Deposits)}
@@ -256,6 +264,7 @@ def finer_classes(
         classes=SizeClasses(**classes),
         bed=bed_of(case, scales, scales.darcy_velocity),
         sticking=choices.sticking,
+        release=release_of(case),
         mud=scales.slab_length * sieve.area,
         cake=cake_permeability(case),
         solids=no_solids(sieve, finer),

@@ -36,7 +36,8 @@ class Sieve:
         passage: (T,) m, diameter of the largest sphere that passes the clean throat.
         opening: (T,) m, radius of the circle of its open area.
         halves: (T, 2) 1/m3, resistances of the sides of the clean throat.
-        way: (T,) m, length of the throat over the tortuosity.
+        reach: (T,) m, length of the throat.
+        winding: the tortuosity of the flow.
         void: (N,) m3 inside the box.
         room: (N,) m, cubic root of the mean void of the tetrahedra that make up a pore.
         surface: (N,) m2 of grains.
@@ -52,7 +53,8 @@ class Sieve:
     passage: Array
     opening: Array
     halves: Array
-    way: Array
+    reach: Array
+    winding: float
     void: Array
     room: Array
     surface: Array
@@ -84,7 +86,8 @@ def sieve_of(network: Network, halves: Array, flux: Array) -> Sieve:
         passage=frozen(2.0 * network.throat_radius),
         opening=frozen(np.maximum(network.throat_radius_effective, network.throat_radius)),
         halves=frozen(np.where(np.isfinite(halves), halves, 0.0)),
-        way=frozen(network.throat_length / max(winding, 1.0)),
+        reach=frozen(network.throat_length),
+        winding=max(winding, 1.0),
         void=frozen(np.bincount(group, whole * network.pore_share)),
         room=frozen(np.cbrt(np.bincount(group, whole) / np.bincount(group))),
         surface=frozen(np.bincount(group, network.pore_wall_surface * network.pore_share, count)),
@@ -286,7 +289,7 @@ def holding(
     stuck = np.zeros_like(passing)
     if np.any(filtering > 0):
         bare = 1.0 - covered(solids.attached, classes, sieve.surface)[one]
-        stuck = -np.expm1(-filtering * (sieve.way[throat] * bare)[:, None])
+        stuck = -np.expm1(-filtering * (sieve.reach[throat] / sieve.winding * bare)[:, None])
     held = 1.0 - (1.0 - stuck) * passing
     return Holding(held=held, stuck=stuck, admitted=_admitted(sieve, solids, classes, full))
 
@@ -359,6 +362,51 @@ def advanced(
         supplied=solids.supplied + come.sum(axis=0),
     )
     return carried, after
+
+
+# ------------------------------------------------------------------------------------------------
+# Release: the flow lifts what sticks where it pulls at the wall hard enough.
+
+
+class Release(NamedTuple):
+    """What the flow lifts.
+
+    Attributes:
+        stress: Pa, of the wall of a throat, above which it does.
+        time: s, in which it lifts all but 1/e.
+    """
+
+    stress: float
+    time: float
+
+
+def released(
+    sieve: Sieve, solids: Deposits, streams: Streams, drop: float, seconds: float, law: Release
+) -> Deposits:
+    """The solids when some of the deposit went back into the fluid, in so many `seconds`.
+
+    A throat of radius r and length l, of the pressure drop dp, has the wall stress r dp / (2 l).
+    Above that of the `law` the deposit in it falls as exp(-t / time); what sticks to the grains
+    of a pore does so by the share of its outflow that leaves through such throats. What was lifted
+    is in the fluid of the pore before the throat. `drop` Pa is that of the specimen.
+    """
+    one, other = sieve.ends.T
+    high, low = streams.pressure[one], streams.pressure[other]
+    stress = sieve.opening * np.abs(high - low) * drop / (2.0 * sieve.reach)
+    lifts = stress > law.stress
+    loose, count = -np.expm1(-seconds / law.time), len(sieve.void)
+    swept = np.bincount(streams.source, streams.share * lifts[streams.link], count)
+    out = np.bincount(streams.source, streams.share, count)
+    share = np.divide(swept, out, out=np.zeros(count), where=out > 0)
+    from_grains = solids.attached * (loose * share)[:, None]
+    from_throats = solids.in_throats * (loose * lifts)[:, None]
+    freed = _gathered(np.where(high >= low, one, other), from_throats, count)
+    return replace(
+        solids,
+        carried=solids.carried + freed + from_grains,
+        attached=solids.attached - from_grains,
+        in_throats=solids.in_throats - from_throats,
+    )
 
 
 LEAST_VOID = 1e-3

@@ -15,12 +15,14 @@ from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient
 from fdnet.classes.deposit import (
     PACKED,
     Deposits,
+    Release,
     Sieve,
     advanced,
     bed_diameter,
     holding,
     kept_shares,
     no_solids,
+    released,
     thickness_of_cake,
 )
 from fdnet.classes.transport import Streams, streams_of
@@ -97,6 +99,7 @@ class Course:
         cap_time: s, when the invasion ends at the latest.
         supply: m3 of solids that come at most.
         sticking: share of contacts with grains that stick.
+        release: what the flow lifts; None: nothing.
         bed: grains and fluid, for what sticks.
     """
 
@@ -111,7 +114,16 @@ class Course:
     cap_time: float
     supply: float
     sticking: float
+    release: Release | None
     bed: Bed
+
+
+def release_of(case: InvasionCase) -> Release | None:
+    """What the flow lifts; None where the case does not ask for it."""
+    one = case.invasion
+    if one is None or one.release_stress_Pa is None or one.release_time_s is None:
+        return None
+    return Release(one.release_stress_Pa, one.release_time_s)
 
 
 def bed_of(case: InvasionCase, scales: InvasionScales, velocity: float) -> Bed:
@@ -200,8 +212,13 @@ def invade_classes(
         if course.duration is None:
             bounds.append(0.25 * course.plug_time * rate)
         volume = min(wanted, *bounds)
+        drop = course.bed.viscosity * velocity * course.resistance / state.k_over_k0
         while True:
-            _, after = advanced(sieve, solids, classes, state.streams, what, volume)
+            loose = solids
+            if course.release:
+                law, streams = course.release, state.streams
+                loose = released(sieve, solids, streams, drop, volume / rate, law)
+            _, after = advanced(sieve, loose, classes, state.streams, what, volume)
             new = kept_shares(sieve, after, classes)
             change = _change(sieve, state.energy, kept, new)
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:

@@ -34,6 +34,8 @@ class Streams:
         share: (K,) its flow over the inflow.
         fed: (N,) share of the inflow that enters a pore from outside.
         outlet: (N,) whether what enters a pore has left the specimen.
+        pressure: (N,) of the pores, over that lost in the specimen.
+        inflow: of that pressure, in the unit of the flow.
     """
 
     order: Array
@@ -44,6 +46,8 @@ class Streams:
     share: Array
     fed: Array
     outlet: Array
+    pressure: Array
+    inflow: float
 
     __repr__ = one_line
 
@@ -79,6 +83,8 @@ def streams_of(
         share=flow / inflow if inflow > 0 else flow,
         fed=np.where(inlet, leaving, 0.0) / (inflow or 1.0),
         outlet=outlet,
+        pressure=pressure,
+        inflow=inflow,
     )
 
 

@@ -331,14 +331,18 @@ def flow_says(folder: Path, case: InvasionCase, scales: InvasionScales, step: in
     """Why the flow before `step` ends an invasion that follows it; None where it does not.
 
     "plugged" when its rate is below `run.stop_rate` of the first one, "duration" when
-    `run.stop_pore_volumes` or more have passed.
+    `run.stop_pore_volumes` or more have passed. Beside finer classes `run.plug_rate` of the first
+    rate ends it too: no more than that of spheres and classes can come.
     """
-    if case.run.stop_rate is None and case.run.stop_pore_volumes is None:
+    rate, volumes = case.run.stop_rate, case.run.stop_pore_volumes
+    if case.with_classes and case.run.duration_s is None:
+        rate = rate or case.run.plug_rate
+    if rate is None and volumes is None:
         return None
     rows = [row for row in read_updates(folder) if row["step"] < step]
     if not rows:
         return None
-    if case.run.stop_rate is not None and rows[-1]["rate_over_initial"] < case.run.stop_rate:
+    if rate is not None and rows[-1]["rate_over_initial"] < rate:
         return "plugged"
     pores = scales.porosity * math.prod(case.size_m)
     most = (case.run.stop_pore_volumes or math.inf) * pores

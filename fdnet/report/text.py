@@ -114,8 +114,11 @@ def end_words(summary: Mapping[str, Any], control: Run) -> str:
         return f"the invasion was cut at {done} % of the steps that it is expected to take"
     if reason != "plugged":
         return ENDS[reason]
-    if control.stop_rate is not None and rate is not None and rate <= control.stop_rate:
-        return f"the rate of flow fell below {percent(control.stop_rate)} % of the first"
+    least = control.stop_rate
+    if summary.get("method") == "both":
+        least = least or control.plug_rate
+    if least is not None and rate is not None and rate <= least:
+        return f"the rate of flow fell below {percent(least)} % of the first"
     most = "no fine"
     if control.plug_rate:
         most = f"at most {percent(control.plug_rate)} % of the fines of the undisturbed mud"
@@ -240,9 +243,10 @@ def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
     scatter = summary.get("scatter")
     if scatter and summary.get("invaded_count") and summary["final"]:
         own = "" if summary["case"] in scatter["source"] else ", and not of this case"
+        by = ", with spheres in LIGGGHTS alone" if "method_error" in summary else ""
         yield (
             f"This is one run with one seed ({summary['seed']}); the ± are one standard deviation "
-            f"of {scatter['runs']} seeds of {scatter['source']}{own}. `fdnet ensemble CASE "
+            f"of {scatter['runs']} seeds of {scatter['source']}{by}{own}. `fdnet ensemble CASE "
             "--seeds 8` gives the band of your own case."
         )
 

@@ -6,7 +6,7 @@ each, or one for several of them where there would be more than `MOST_ROWS`.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,8 +25,10 @@ from fdnet.classes.invasion import (
     cake_resistance,
     flows_through,
     invade_classes,
+    release_of,
 )
 from fdnet.dem.checkpoint import HISTORY, Checkpoint
+from fdnet.errors import Doubt, FlowError, explained
 from fdnet.files import replacing
 from fdnet.names import SIZE_CLASSES
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy, ratio
@@ -96,6 +98,11 @@ def class_model(
     halves = grain_resistances(network)
     clean = 1.0 / halves.sum(axis=1)
     first = solve_flow(network, clean)
+    if first.inflow <= 0:
+        raise FlowError(
+            "the pack has no open path from the face to the other end, and size classes move with "
+            "the flow: make another pack by another seed, or a higher grains.porosity"
+        )
     sieve = sieve_of(network, halves, first.throat_flux)
     below = case.fines.finest_m if case.with_classes else math.inf
     classes = mud_classes(case.fines, choices.classes, below=below)
@@ -135,6 +142,7 @@ def _course(
         cap_time=scales.cap_time * physical,
         supply=solids,
         sticking=0.0 if case.invasion is None else case.invasion.sticking,
+        release=release_of(case),
         bed=bed_of(case, scales, velocity),
     )
 
@@ -167,12 +175,25 @@ def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) ->
         "dt_s": 0.0,
         "supplied": int(counts.supplied.sum()),
         "mass_missing": missing,
-        "warnings": [],
+        "warnings": [explained(one) for one in all_is_cake(model)],
         "ranks": 1,
         "files": digests_of(folder, [HISTORY, STATE]),
         "runs": [],
         "left_out": ["the motion of single fines: size classes on the pore network instead"],
     }
+
+
+def all_is_cake(model: ClassModel) -> Iterator[str]:
+    """Classes that no throat lets in, in words."""
+    widest = float(model.sieve.passage.max())
+    if np.any(wide := model.classes.low >= widest):
+        own = model.classes
+        yield Doubt(
+            "all-is-cake",
+            f"fines of {1e6 * own.low[wide].min():.3g} to {1e6 * own.high[wide].max():.3g} µm are "
+            f"wider than every throat ({1e6 * widest:.3g} µm at most): but for what fills the "
+            "pores of the face, all of it is cake",
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -131,6 +131,12 @@ def movie_of(
     run = open_run(folder)
     path = target or run.path / "invasion.gif"
     refuse_suffix(path)
+    if run.summary.get("method") == "network" and path.suffix.lower() != ".png":
+        raise CaseError(
+            f"{run.path}: the fast model keeps the end of an invasion alone, so there is no "
+            "movie; give --out FILE.png for a picture of before and after, or run the case "
+            "without --fast"
+        )
     refuse_present(path, force=force)
     refuse_without_view(str(path))
     check_finished(folder)

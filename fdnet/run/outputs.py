@@ -104,12 +104,12 @@ def write_paraview(results: Results) -> list[str]:
     vtk.write_pvd(
         path / "spheres.pvd", [(0.0, "spheres_initial.vtp"), (shown.time_s, "spheres_damaged.vtp")]
     )
-    if one is not None and not one.rows:
+    if one is not None:
         (path / "frames").mkdir(exist_ok=True)
         stride, entries = -(-len(one.history) // MOST_FRAMES), []
         chosen = one.history[::-1][::stride][::-1]
         states = readable_states(path / "invade", chosen, one.case, one.scales, results.grains)
-        for row, state in states:
+        for row, state in [(one.history[-1], one.damaged)] if one.rows else states:
             name = f"frames/spheres_{row.step}.vtp"
             moving = state if one.case.grains.motion == "mobile" else state.fines()
             vtk.write_spheres_vtp(path / name, moving)

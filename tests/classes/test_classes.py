@@ -13,7 +13,16 @@ from fdnet.classes.capture import (
     mud_classes,
     wider_share,
 )
-from fdnet.classes.deposit import Sieve, advanced, holding, no_solids, sieve_of
+from fdnet.classes.deposit import (
+    Release,
+    Sieve,
+    advanced,
+    holding,
+    kept_shares,
+    no_solids,
+    released,
+    sieve_of,
+)
 from fdnet.classes.invasion import Course, flows_through, invade_classes
 from fdnet.classes.transport import carry, streams_of
 from fdnet.network.flow.flow import solve_flow
@@ -45,7 +54,8 @@ def chain(count, *, step=1.0, void=1e-3, surface=1.0, passage=1.0):
         passage=np.full(count - 1, passage),
         opening=np.full(count - 1, 0.5 * passage),
         halves=np.ones((count - 1, 2)),
-        way=np.full(count - 1, step),
+        reach=np.full(count - 1, step),
+        winding=1.0,
         void=np.full(count, void),
         room=np.full(count, np.cbrt(void)),
         surface=np.full(count, surface),
@@ -99,6 +109,30 @@ def test_a_surface_that_fills_up_gives_the_solution_of_bohart_and_adams():
             expected = np.exp(t) / (np.exp(x) + np.exp(t) - 1.0)
             got = carried.concentration[:-1, 0] / classes.concentration
             assert got == pytest.approx(expected, abs=0.01)
+
+
+def test_a_flow_lifts_a_deposit_above_the_critical_wall_stress_alone():
+    """Of one throat: r dp / (2 l); below it nothing moves, above it falls as exp(-t / time)."""
+    sieve, classes = chain(4, passage=0.1), sizes(1e-6)
+    solids = no_solids(sieve, classes)
+    solids.in_throats[1], solids.attached[1] = 3e-9, 5e-9
+    streams, drop = through(sieve), 600.0
+    stress = 0.05 * (drop / 3) / (2 * 1.0)
+    kept = kept_shares(sieve, solids, classes)
+    assert kept.min() < 1.0
+    below = released(sieve, solids, streams, drop, 7.0, Release(1.001 * stress, 2.0))
+    assert np.array_equal(kept_shares(sieve, below, classes), kept)
+    assert np.array_equal(below.carried, solids.carried)
+    law = Release(0.999 * stress, 2.0)
+    above = solids
+    for seconds in (0.5, 2.5, 4.0):
+        above = released(sieve, above, streams, drop, seconds, law)
+    left = np.exp(-7.0 / 2.0)
+    assert above.in_throats[1, 0] == pytest.approx(3e-9 * left, rel=1e-12)
+    assert above.attached[1, 0] == pytest.approx(5e-9 * left, rel=1e-12)
+    assert above.carried[1, 0] == pytest.approx(8e-9 * (1 - left), rel=1e-12)
+    assert above.inside_by_class == pytest.approx(solids.inside_by_class, rel=1e-14)
+    assert kept_shares(sieve, above, classes)[1, 0] > kept[1, 0]
 
 
 def test_one_sweep_solves_the_balance_of_every_pore():
@@ -180,14 +214,23 @@ def course(sieve, **keys):
         "cap_time": 1e6,
         "supply": 0.5 * float(sieve.void.sum()),
         "sticking": 0.0,
+        "release": None,
         "bed": BED,
     }
     return Course(**given | keys)
 
 
-def test_mass_of_every_class_is_found_again_and_none_falls_below_zero():
+@pytest.mark.parametrize("release", [None, Release(1e-6, 500.0)])
+def test_mass_of_every_class_is_found_again_and_none_falls_below_zero(release):
     sieve, flow = pack()
-    end = invade_classes(sieve, sizes(0.05, 0.2, 0.5), course(sieve), flow)
+    ways = {"release": release, "sticking": 1.0 if release else 0.0}
+    ends = [
+        invade_classes(sieve, sizes(0.05, 0.2, 0.5), course(sieve, **ways | more), flow)
+        for more in ({}, {"release": None})
+    ]
+    end = ends[0]
+    rest = [one.solids.in_throats.sum() + one.solids.attached.sum() for one in ends]
+    assert rest[0] < 0.9 * rest[1] if release else rest[0] == rest[1]
     assert np.abs(end.solids.missing).max() < 1e-12
     assert end.solids.supplied.min() > 0
     for one in (*end.solids.inside, end.solids.cake, end.solids.passed):

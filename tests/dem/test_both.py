@@ -5,9 +5,10 @@ import pytest
 from builders import followed
 from cut_and_continue import differences
 
-from fdnet.case.file import case_from
+from fdnet.case.file import case_from, set_keys
 from fdnet.classes.beside_spheres import Passed, Stands
 from fdnet.classes.deposit import kept_shares
+from fdnet.dem import checkpoint
 from fdnet.dem.checkpoint import Checkpoints
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
@@ -26,6 +27,10 @@ def mud(method, *more, cut=80.0, sizes=WIDE):
     fines = {"sizes": sizes, "count": 100, "concentration": 0.2, "supply": "batches"}
     fines |= {} if cut is None else {"cut_um": cut}
     return case_from(tables | {"fines": fines, "invasion": {"method": method}})
+
+
+def set_in(case, *assignments):
+    return case_from(set_keys(case.data(), list(assignments)))
 
 
 @pytest.fixture(scope="module")
@@ -153,6 +158,17 @@ def test_spheres_hold_classes_that_would_pass_without_them(fluid):
         assert np.abs(finer.solids.missing).max() < 1e-12
     assert held[1] > 1.5 * held[0]
     finer.forget()
+
+
+def test_the_common_flow_ends_it_where_the_spheres_would_go_on(tmp_path, monkeypatch):
+    """At `run.plug_rate` of the first rate; a case of spheres alone asks for `run.stop_rate`."""
+    rows = [{"step": 5, "rate_over_initial": 0.04, "filtrate_m3": 0.0}]
+    monkeypatch.setattr(checkpoint, "read_updates", lambda folder: rows)
+    for case, said in ((mud("both"), "plugged"), (mud("liggghts", cut=None), None)):
+        case = set_in(case, "run.plug_rate=0.05")
+        assert checkpoint.flow_says(tmp_path, case, scales_of(case), 9) == said
+    less = set_in(mud("both"), "run.plug_rate=0.03")
+    assert checkpoint.flow_says(tmp_path, less, scales_of(less), 9) is None
 
 
 def test_what_does_not_go_with_both_is_refused():

@@ -7,9 +7,13 @@ import pytest
 from builders import tiny
 
 from fdnet.classes.invasion import cake_permeability
-from fdnet.errors import CaseError
+from fdnet.errors import CaseError, FlowError
+from fdnet.run import by_classes
+from fdnet.run.by_classes import all_is_cake, class_model
 from fdnet.run.finished import open_run
+from fdnet.run.movie import moments_of, movie_of
 from fdnet.run.pipeline import run_case
+from fdnet.scales.scales import invasion_scales
 
 FAST = (
     "invasion.method=network",
@@ -66,6 +70,40 @@ def test_a_killed_run_goes_on_from_the_pack_to_the_same_bits(fast, tmp_path):
     assert open_run(again).summary["k_damaged_m2"] == fast.summary["k_damaged_m2"]
 
 
+def test_the_scatter_that_it_prints_is_said_to_be_of_spheres(fast):
+    text = " ".join(fast.summary["certainty"])
+    assert "8 seeds of cases/quick.toml, with spheres in LIGGGHTS alone" in text
+    assert "by the fast model of size classes" in text
+
+
+def test_it_draws_a_picture_of_before_and_after_and_refuses_a_movie(fast, tmp_path):
+    with pytest.raises(CaseError, match=r"the end of an invasion alone.*--out FILE\.png"):
+        movie_of(fast.path, tmp_path / "movie.gif")
+    before, after = moments_of(fast)
+    assert before.spheres is None
+    assert after.row["invaded"] == fast.summary["invaded_count"]
+    assert after.spheres.is_file()
+
+
+def test_a_class_above_every_throat_is_said_to_be_cake(fast):
+    case = tiny(*FAST, "fines.radius_mm=0.24", "fines.count=20")
+    model = class_model(case, invasion_scales(case), fast.spheres("initial"))
+    (said,) = all_is_cake(model)
+    assert said.startswith("fines of 480 to 480 µm are wider than every throat (")
+    assert not list(
+        all_is_cake(class_model(fast.case, invasion_scales(case), fast.spheres("initial")))
+    )
+
+
+def test_a_pack_without_a_path_and_a_mud_above_packing_are_refused(fast, monkeypatch):
+    with pytest.raises(CaseError, match=r"fines.concentration: .*0\.3"):
+        tiny(*FAST, "fines.concentration=0.65")
+    shut = lambda network: np.full((len(network.throat_radius), 2), np.inf)  # noqa: E731
+    monkeypatch.setattr(by_classes, "grain_resistances", shut)
+    with pytest.raises(FlowError, match="no open path from the face"):
+        class_model(fast.case, invasion_scales(fast.case), fast.spheres("initial"))
+
+
 def test_the_pack_is_that_of_a_run_with_spheres():
     spheres = tiny("box.sides=periodic")
     assert tiny(*FAST).digest("pack") == spheres.digest("pack")
@@ -84,6 +122,7 @@ def test_the_pack_is_that_of_a_run_with_spheres():
         (("cake.permeability_m2=1e-18",), "the table belongs to invasion.method"),
         (("invasion.method=network", "clean_up.drawdown_MPa=1"), "nothing turns the flow back"),
         (("invasion.method=network", "grains.motion=mobile"), "grains that stay"),
+        (("invasion={method='network',release_stress_Pa=1.0}",), "release_time_s: is missing"),
     ],
 )
 def test_what_does_not_go_together_is_refused(keys, said):
