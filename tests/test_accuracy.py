@@ -45,7 +45,7 @@ def test_a_fine_that_vanishes_changes_nothing():
         fine = resting(np.mod(centre, size)[None], radius, pack.box, Kind.FINE)
         changes.append(by_all_spheres(grains.joined(fine))[0] / k0 - 1.0)
     assert len(changes) == 14
-    assert abs(np.mean(changes)) < 2e-3
+    assert abs(np.mean(changes)) < 3e-3
     assert -0.01 < min(changes) < max(changes) < 0.01
 
 

@@ -37,10 +37,8 @@ class Network:
             fines are tessellated alike, or of a grain with its centre inside another one.
         image_position: (M, 3) m.
         image_radius: (M,) m.
-        image_height: (M,) m, how far the image reaches from its centre along x. It is the radius,
-            and less for the half ellipsoid (semi-axes h along x and (r^3 / h)^(1/2) across, with
-            the radius r of the half sphere of its volume) that stands for the cap of a grain
-            centred beyond an x face.
+        image_own_radius: (M,) m, of the grain itself where the image is a half sphere that stands
+            for the cap of a grain centred beyond an x face; else the radius.
         image_outward: (M,) m, from the place of such an image along x to the centre of its grain,
             which lies beyond the face; 0 for all others.
         pore_images: (P, 4) images at the corners of the tetrahedron.
@@ -80,7 +78,7 @@ class Network:
     image_fine: Array
     image_position: Array
     image_radius: Array
-    image_height: Array
+    image_own_radius: Array
     image_outward: Array
     pore_images: Array
     pore_wrap: Array
@@ -146,11 +144,6 @@ class Network:
         return self.image_position[self.throat_images[throats]] - wrap[:, None]
 
     @property
-    def throat_corner_radius(self) -> Array:
-        """Radii (T, 3) m of the grains at the corners of the facet."""
-        return self.image_radius[self.throat_images]
-
-    @property
     def throat_ends(self) -> Array:
         """Places (T, 2, 3) m of the first pore and of the second next to it."""
         ends = self.pore_position[self.throat_pores]
@@ -211,7 +204,7 @@ def build_network(
         image_fine=((placed.grains.kind == Kind.FINE) | placed.inside)[points.owner],
         image_position=points.position,
         image_radius=points.radius,
-        image_height=placed.height[points.owner],
+        image_own_radius=placed.own_radius[points.owner],
         image_outward=np.where(beyond_low, -outward, outward),
         counts={
             "grains_outside_box": len(grains) - len(placed.index) - placed.dropped,

@@ -27,7 +27,7 @@ def network_of(
         "image_fine": np.zeros(1, bool),
         "image_position": np.zeros((1, 3)),
         "image_radius": np.ones(1),
-        "image_height": np.ones(1),
+        "image_own_radius": np.ones(1),
         "image_outward": np.zeros(1),
         "pore_images": np.zeros((pores, 4), int),
         "pore_wrap": np.zeros((pores, 3), int),

@@ -3,76 +3,81 @@
 Flux in m4 is the integral of w over the open part where laplacian(w) = -1 and w = 0 on the discs.
 """
 
-from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import numba
 import numpy as np
 from scipy import sparse
+from scipy.optimize import fsolve
 from scipy.sparse.linalg import splu, spsolve
 from scipy.spatial import Delaunay
 
 from fdnet.network.laws.cross_section import (
-    LANES,
+    HUGE,
+    MOST_BODIES,
+    OPEN,
     Sections,
-    WallCuts,
-    disc_fluxes,
-    disc_room,
-    edge_fluxes,
-    wall_fluxes,
+    Shapes,
+    section_fluxes,
 )
-from fdnet.network.laws.wedges import ratio_table
+from fdnet.network.laws.reaching_grains import SpheresBeside
 from fdnet.spheres.snapshot import Array
 
-FIRST = np.zeros(1, int)
 
+def polygon_flux(corner: Any, discs: Any, walls: Any = (), middle: Any = None) -> float:
+    """Flux m4 through a polygon of 3 or 4 corners among discs (x, y, radius), all in m.
 
-@cache
-def from_python(function: Any) -> Callable[..., Any]:
-    """A function that compiled functions alone can call (`loops_inside`), for Python."""
-
-    @numba.njit
-    def call(*given: Any) -> Any:
-        return function(*given)
-
-    return call  # type: ignore[no-any-return]
-
-
-def sections_with(discs: Array) -> Sections:
-    """Sections with the radii `discs` (3, n) m of one side of a throat."""
-    none = np.zeros(1)
-    return Sections(throat=FIRST, side=FIRST, low=none, step=none, disc=discs[None].copy())
+    The `walls` are discs of `HUGE` radii. The rays of a disc are divided at the `middle` (2,) m.
+    """
+    corner, bodies = np.array(corner, float), np.array([*discs, *walls], float)
+    four, body = np.zeros((1, 4, 2)), np.zeros((1, MOST_BODIES, 5))
+    four[0, : len(corner)] = corner
+    others = np.insert(bodies, 2, 0.0, axis=1)
+    flatness = np.repeat([1.0, 0.0], [len(discs), len(walls)])
+    around = SpheresBeside(
+        first=np.array([0, len(others)]), place=np.column_stack([others, flatness])
+    )
+    place = corner.mean(axis=0) if middle is None else middle
+    count = np.array([len(corner)])
+    shapes = Shapes(four, count, body, np.ones(1), np.array([place], float))
+    none, side = np.zeros(1), np.zeros(1, int)
+    sections = Sections(throat=side, side=side, low=none, step=none, many=1)
+    return float(section_fluxes(shapes, sections, around, OPEN)[0][0, 0])
 
 
 def disc_flux(base: Array, disc: Array) -> float:
     """Flux m4 through the triangle `base` (3, 2) m with discs of the radii `disc` (3,) m."""
-    flux, given = np.empty((1, 1)), sections_with(np.asarray(disc)[:, None])
-    disc_fluxes(FIRST, given, base[None], ratio_table(), disc_room(1), flux)
-    return float(flux[0, 0])
+
+    def rims(guess: Array) -> Array:
+        return np.linalg.norm(base - guess[:2], axis=1) - disc - guess[2]
+
+    start = [*base.mean(axis=0), 0.1 * float(np.ptp(base))]
+    found, _, done, _ = fsolve(rims, start, full_output=True)
+    middle = found[:2] if done == 1 else None
+    return polygon_flux(base, np.column_stack([base, disc]), middle=middle)
 
 
-def wall_flux(place: Any, first: Any, second: Any) -> Any:
-    """Fluxes m4 between the wall and discs of the radii `first` and `second` m, of one or more.
+def wall_flux(place: Any, first: float, second: float) -> float:
+    """Flux m4 between the wall and discs of the radii `first` and `second` m.
 
     `place` (3,) m: both heights of the discs above the wall, and how far apart they are along it.
     """
-    place = np.array(place, float)
-    cuts = WallCuts(order=np.array([[0, 1]]), place=place[None], part=np.ones(1))
-    return _walled(wall_fluxes, np.stack([first, second, second]), cuts)
+    one, two, apart = place
+    huge = HUGE * max(place)
+    corner = [(0.0, one), (apart, two), (apart, 0.0), (0.0, 0.0)]
+    if two == 0.0:
+        del corner[1]
+    discs = [(0.0, one, first), (apart, two, second)]
+    return polygon_flux(corner, discs, [(0.5 * apart, -huge, huge)])
 
 
-def edge_flux(place: Any, disc: Any) -> Any:
-    """Fluxes m4 between two walls and discs of radius `disc` m, `place` (2,) m away."""
-    cuts = WallCuts(order=np.array([[0, -1]]), place=np.array([[*place, 0.0]]), part=np.ones(1))
-    return _walled(edge_fluxes, np.stack([disc, disc, disc]), cuts)
-
-
-def _walled(law: Any, discs: Array, cuts: WallCuts) -> Any:
-    flux = np.empty((1, discs[0].size))
-    lanes = np.full((LANES, flux.size), np.nan)
-    law(FIRST, sections_with(discs.reshape(3, -1)), cuts, ratio_table(), lanes, flux)
-    return flux[0] if discs.ndim > 1 else flux[0, 0]
+def edge_flux(place: Any, disc: float) -> float:
+    """Flux m4 between two walls and a disc of radius `disc` m, `place` (2,) m away."""
+    high, far = place
+    huge = HUGE * max(place)
+    walls = [(0.5 * far, -huge, huge), (far + huge, 0.5 * high, huge)]
+    corner = [(0.0, high), (far, high), (far, 0.0), (0.0, 0.0)]
+    return polygon_flux(corner, [(0.0, high, disc)], walls)
 
 
 # ------------------------------------------------------------------------------------------------

@@ -39,9 +39,9 @@ def test_a_body_centred_throat_by_the_formulas_on_paper():
 def test_thin_slabs_against_resolved_stokes_flow():
     """Between pressure planes that cut caps off grains, on two grids each; nothing is fitted."""
     for count, more, share, error in [
-        (30, {}, (0.2, 0.8), 0.03),
+        (30, {}, (0.2, 0.8), 0.035),
         (30, {"spread": 0.3}, (0.2, 0.8), 0.03),
-        (30, {"spread": 0.3}, (0.35, 0.65), 0.055),
+        (30, {"spread": 0.3}, (0.35, 0.65), 0.06),
         (60, {"aspect": 2.0}, (0.35, 0.65), 0.03),
     ]:
         pack = random_pack(count, **more)

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from fdnet.network.laws import deposit_resistances as deposit
 from fdnet.network.laws import wedges
 from tests.network.sections import (
     disc_flux,
     edge_flux,
-    from_python,
+    polygon_flux,
     resolved_beside_walls,
     resolved_flux,
     wall_flux,
@@ -75,37 +74,28 @@ def test_equal_discs_against_finite_elements():
 
 
 def test_equal_discs_in_an_obtuse_triangle_against_finite_elements():
-    """Its circumcentre lies beyond the long edge: signed shares alone give -97 to 97 %."""
+    """Its circumcentre lies beyond the long edge."""
     for edge in (2.85, 2.9, 3.0, 3.1):
         base = np.array([[0.0, 0.0], [edge, 0.0], [edge / 2, np.sqrt(4.0 - edge**2 / 4)]])
         for disc in (0.6, 0.9, 0.98):
             discs = np.full(3, disc)
             ratio = disc_flux(base, discs) / resolved_flux(base, discs)
-            assert ratio == pytest.approx(1.0, abs=0.13), (edge, disc)
+            assert ratio == pytest.approx(1.05, abs=0.07), (edge, disc)
 
 
 def test_unequal_discs_against_finite_elements():
-    """The law over finite elements; rays give the last (docs/physics_network.md)."""
+    """The law over finite elements (docs/physics_network.md)."""
     for edge, apex, disc, ratio in [
         (1.0, (0.5, 0.4), (0.5, 0.5, 0.1), 0.98),
-        (1.2, (0.6, 0.2), (0.5, 0.5, 0.1), 0.94),
-        (0.7, (0.35, 0.7), (0.1, 0.1, 0.5), 1.12),
+        (1.2, (0.6, 0.2), (0.5, 0.5, 0.1), 0.93),
+        (0.7, (0.35, 0.7), (0.1, 0.1, 0.5), 0.98),
+        (1.0, (1.098, 0.706), (0.560, 0.374, 0.184), 1.0),
+        (1.0, (1.000, 0.513), (0.601, 0.309, 0.058), 0.97),
+        (1.0, (1.144, 0.308), (0.420, 0.141, 0.118), 1.05),
     ]:
         base, discs = np.array([[0.0, 0.0], [edge, 0.0], apex]), np.array(disc)
         exact = resolved_flux(base, discs)
-        assert disc_flux(base, discs) / exact == pytest.approx(ratio, abs=0.01), (apex, disc)
-
-
-def test_sections_whose_signed_shares_cancel_are_summed_over_rays():
-    """The law over finite elements, where the signed shares of three discs give 1 to 18 %."""
-    for apex, disc, ratio in [
-        ((1.098, 0.706), (0.560, 0.374, 0.184), 0.96),
-        ((1.000, 0.513), (0.601, 0.309, 0.058), 0.98),
-        ((1.144, 0.308), (0.420, 0.141, 0.118), 0.93),
-    ]:
-        base, discs = np.array([[0.0, 0.0], [1.0, 0.0], apex]), np.array(disc)
-        exact = resolved_flux(base, discs, 400)
-        assert disc_flux(base, discs) / exact == pytest.approx(ratio, abs=0.02), apex
+        assert disc_flux(base, discs) / exact == pytest.approx(ratio, abs=0.015), (apex, disc)
     # a small disc near the line between two large ones, and a closed section
     base = np.array([[0.0, 0.0], [3.0, 0.0], [1.608, 0.2306]])
     assert 0.0 < disc_flux(base, np.array([1.2458, 1.2458, 0.1584])) < 1e-2
@@ -122,53 +112,27 @@ def test_half_sections_of_a_wall_against_finite_differences():
         "both raised": ((1.5, 1.5, 2.0), (1.0, 1.0)),
         "steep": ((1.0, 2.2, 1.7), (1.0, 1.0)),
         "cut and unequal": ((0.6, 1.3, 2.2), (1.0, 0.7)),
-        "on the wall": ((0.0, 1.0, 2.2), (1.0, 1.0)),
+        "its touching circle is centred outside": ((1.2, 2.8, 1.3), (1.0, 1.0)),
     }
     for name, (place, disc) in cases.items():
         exact = resolved_beside_walls(place, disc)
-        assert wall_flux(place, *disc) == pytest.approx(exact, rel=0.06), name
-    place, disc = (1.2, 2.8, 1.3), (1.0, 1.0)  # the touching circle is centred outside
+        assert wall_flux(place, *disc) == pytest.approx(exact, rel=0.05), name
+    place, disc = (1.0, 0.0, 2.2), (1.0, 1.0)  # the second disc is centred on the wall
     exact = resolved_beside_walls(place, disc)
-    assert 0.5 * exact < wall_flux(place, *disc) < exact
+    assert exact < wall_flux(place, *disc) < 1.15 * exact
 
 
 def test_quarter_sections_of_an_edge_against_finite_differences():
     for far in (1.0, 1.5, 2.0):
         for disc in (1.0, 0.8, 0.5, 0.2):
             exact = resolved_beside_walls((1.0, 1.0, far), (disc, 0.0), edge=True)
-            assert edge_flux((1.0, far), disc) == pytest.approx(exact, rel=0.06), (far, disc)
-    flux = edge_flux((1.0, 1.0), np.array([1.5, 1.4]))
-    assert flux[0] == 0.0 < flux[1], "a disc over the edge of the box leaves nothing"
+            assert edge_flux((1.0, far), disc) == pytest.approx(exact, rel=0.07), (far, disc)
+    assert edge_flux((1.0, 1.0), 1.5) == 0.0, "a disc over the edge of the box leaves nothing"
+    assert edge_flux((1.0, 1.0), 1.4) > 0.0
 
 
 # ------------------------------------------------------------------------------------------------
-# Sections among fines, summed over points, with side walls and planes of pressure.
-
-
-AXES = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-"""The sections lie across x: their first axis is z, their second y."""
-
-
-def points_flux(base, discs):
-    """Flux m4 among `discs` (x, y, radius) m."""
-    discs = np.column_stack([np.array(discs, float), np.full(len(discs), -np.inf)])
-    room = deposit.point_room(deposit.DIVISIONS)
-    given = np.array(base, float), discs, len(discs), np.empty((0, 3)), 0, room
-    return from_python(deposit.points_flux)(*given)
-
-
-def held_flux(base, discs, planes, axes=AXES):
-    """Flux m4; `planes` are (axis, sense, place m)."""
-    most, origin = deposit.MOST_PLANES, np.zeros(3)
-    given = np.array([[0.0, 1.0, -np.inf]] * most)
-    for axis, sense, place in planes:
-        given[2 * axis + (sense < 0)] = axis, sense, place
-    room = np.zeros((len(discs) + most, 4))
-    room[: len(discs), :3], room[: len(discs), 3] = discs, -np.inf
-    where = given, origin, np.array(axes), 0.0, np.empty((most, 3))
-    points = deposit.point_room(deposit.DIVISIONS)
-    held = from_python(deposit.held_flux)
-    return held(np.array(base, float), room, len(discs), *where, points)
+# Sections among fines, of which some stand beyond the triangle.
 
 
 def lattice(radii):
@@ -182,24 +146,11 @@ def lattice(radii):
 def test_sections_among_fines_against_finite_elements():
     """A lattice has no flow of shear across the sides of its triangles."""
     for radii, ratio in [
-        ((0.4, 0.4, 0.4), 0.99),
-        ((0.45, 0.3, 0.1), 0.96),
-        ((0.45, 0.45, 0.02), 0.96),
-        ((0.45, 0.1, 0.1), 0.92),
+        ((0.4, 0.4, 0.4), 1.0),
+        ((0.45, 0.3, 0.1), 1.06),
+        ((0.45, 0.45, 0.02), 1.21),
+        ((0.45, 0.1, 0.1), 1.0),
     ]:
         exact = resolved_flux(EQUAL_SIDES, np.array(radii))
-        flux = points_flux(EQUAL_SIDES, lattice(radii))
-        assert flux / exact == pytest.approx(ratio, abs=0.01), radii
-
-
-def test_triangles_that_walls_halve_against_finite_differences():
-    """Both halves are the half-section; along an edge it is twice the quarter of the rectangle."""
-    for disc in [(0.5, 0.5), (0.8, 0.3), (0.2, 0.6)]:
-        base, discs = [[0, 1], [0, -1], [1.7, 0]], [[0, 1, disc[0]], [1.7, 0, disc[1]]]
-        exact = 2.0 * resolved_beside_walls((1.0, 0.0, 1.7), disc)
-        assert held_flux(base, discs, [(1, 1.0, 0.0)]) == pytest.approx(exact, rel=0.1), disc
-    for disc in (0.8, 0.5, 0.2):
-        base = [[1, 1.3], [-1, 1.3], [1, -1.3]]
-        exact = 2.0 * resolved_beside_walls((1.3, 1.3, 1.0), (disc, 0.0), edge=True)
-        flux = held_flux(base, [[1, 1.3, disc]], [(1, 1.0, 0.0), (2, 1.0, 0.0)])
-        assert flux == pytest.approx(exact, rel=0.1), disc
+        flux = polygon_flux(EQUAL_SIDES, lattice(radii))
+        assert flux / exact == pytest.approx(ratio, abs=0.015), radii

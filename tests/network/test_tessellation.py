@@ -88,7 +88,7 @@ def test_pores_and_throats_of_unequal_overlapping_grains_are_the_closed_forms():
     away = np.linalg.norm((share @ corner[p])[:, None] - corner[p], axis=2)
     void = np.all(away > radius[p], axis=1).mean()
     assert network.pore_volume[p] / volume[p] == pytest.approx(void, abs=2 / np.sqrt(400_000))
-    triangle, disc = network.throat_corner, network.throat_corner_radius
+    triangle, disc = network.throat_corner, network.image_radius[network.throat_images]
     circle = np.nan_to_num(np.maximum(closed_forms.touching_circle(triangle, disc), 0.0))
     assert network.throat_radius == pytest.approx(circle, rel=1e-8, abs=1e-12)
     opened = np.where(circle > 0, np.maximum(closed_forms.open_area(triangle, disc), 0.0), 0.0)

@@ -1,30 +1,60 @@
-"""The flow through sections of throats: between three grains, at a wall and in an edge.
+"""The flow through sections of throats: grains, walls, a pressure plane, and fines.
 
-Each section is a plane parallel to the facet of its throat. The functions that end in `_fluxes`
-take the sections of many throats at once.
+Each section is a plane parallel to the facet of its throat, and what of it lies inside the box is
+a polygon: the triangle of the facet, or its part beside side walls that hold the fluid. A sphere
+that the section meets shows a disc in it, wherever its centre lies, and a wall is a disc of huge
+radius. Every disc keeps the fluid that is nearer to its rim than to any other: what its rays see
+of the polygon, from its rim or from where they enter the polygon, to the far side or to the line
+midway to the rim of another disc. There the fluid has no shear.
+
+From the centre of a disc the line midway to another one lies at d(t) = (a^2 - e^2) / (2 (a cos t +
+e)) on the ray at the angle t from the line between the centres, with their distance a and the
+excess e of the radius of the other disc. The flux on rays (`wedges`) neglects the shear between
+them. Rays that one other disc ends on one side of the line between the centres are a wedge, and
+are multiplied by the ratio of the exact flux through such a wedge to that on its rays.
+
+The rays end in Gauss's points on the far sides, so the sum does not depend on the order of the
+corners and is the same for a mirrored section.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
+from fdnet.network import geometry
 from fdnet.network.compiled import loops_in_place, loops_inside
-from fdnet.network.laws.wedges import (
-    FINE_POINTS,
-    FINE_WEIGHTS,
-    POINTS,
-    QUARTER,
-    WEIGHTS,
-    angle_of,
-    cosine_of,
-    flux_on_ray,
-    log_of,
-    midway,
-    shear_ratio,
-    sine_of,
-)
+from fdnet.network.laws.reaching_grains import SpheresBeside, facet_axes
+from fdnet.network.laws.wedges import log_of, ratio_table, shear_ratio
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array
+
+TIP = 1e-2
+"""Smallest radius of the disc that a sphere of the facet shows in a section, in its own radii."""
+HUGE = 100.0
+"""Radius of the disc that stands for a wall, in widths of the section."""
+MOST_BODIES = 5
+"""What holds the fluid of a throat: three spheres at the corners and two walls."""
+DOUBLE_EDGE_SHARE = 0.25
+"""Part of the slipping flux that a throat carries which two walls cut between several grains."""
+TOLERANCE = 1e-9
+"""Lengths up to this many mean grain radii are 0."""
+
+
+class Shapes(NamedTuple):
+    """The sections of K throats, whatever their height; x along the first edge of the facet, y
+    towards its third corner, z above it towards the second pore, from the first corner."""
+
+    corner: Array
+    """(K, 4, 2) m, of the polygon."""
+    corners: Array
+    """(K,) how many it has, 3 or 4."""
+    body: Array
+    """(K, 5, 5) of the throat's own bodies: x, y, z and radius m, and flatness, 1 of a sphere and
+    0 of a wall. There is none where the radius is 0."""
+    part: Array
+    """(K,) flux of the whole throat over that of the polygon."""
+    middle: Array
+    """(K, 2) m, the place in the facet that is farthest from its discs; about it beside walls."""
 
 
 class Sections(NamedTuple):
@@ -38,120 +68,177 @@ class Sections(NamedTuple):
     """(S,) m, the first section above the facet, on its side."""
     step: Array
     """(S,) m between two sections."""
-    disc: Array
-    """(S, 3, n) m, radii of the discs of the grains on the corners."""
+    many: int
+    """n."""
 
 
 # ------------------------------------------------------------------------------------------------
-# The flow on rays from the three corners of a section, whatever discs lie on them.
+# The polygons of throats, and the bodies on them.
 #
-# Each disc keeps what its rays see of the triangle before a line midway to the rim of another disc
-# or the opposite side. The directions of the rays do not change with the radii of the discs, so
-# they are set up once for all sections of a throat.
+# The facet of a throat that one side wall cuts has a grain i, its mirror image across the wall,
+# and a grain j or its image as corners. Inside the box it is the trapezoid between i, j and their
+# feet on the wall, half of a trapezoid that two such throats make up; a triangle with j on the
+# wall is alone and stands for two. On an edge of the box the facet has a grain and its images
+# across both walls. Two such throats make up a rectangle, a quarter of which lies inside the box.
 
 
-RAYS = len(FINE_POINTS)
-"""Rays of each corner."""
-STEEPEST = 1e-3
-"""Smallest cosine of the angle between a ray and the normal of the opposite side."""
+def shapes_of(network: Network, part: slice) -> Shapes:
+    """The polygons of the throats `part` (K), and their own bodies.
+
+    A grain centred beyond an x face, of which the pack has a cap, is the whole grain, where it is.
+    """
+    images = network.throat_images[part]
+    facet = network.image_position[images]
+    count, outward = len(images), network.image_outward[images]
+    corner, body = np.zeros((count, 4, 2)), np.zeros((count, MOST_BODIES, 5))
+    corner[:, :3] = geometry.flat(facet)
+    body[:, :3, :2], body[:, :3, 4] = corner[:, :3], 1.0
+    body[:, :3, 3] = network.image_own_radius[images]
+    row = np.flatnonzero(np.any(outward != 0.0, axis=1))
+    if len(row):
+        for i, axis in enumerate(facet_axes(network, part.start + row, facet[row])):
+            body[row, :3, i] += outward[row] * axis[:, :1]
+    middle = _middles(corner, network.image_radius[images], network.throat_radius[part])
+    shapes = Shapes(corner, np.full(count, 3), body, np.ones(count), middle)
+    if network.walls == "no-slip":
+        _cut_at_wall(network, part, shapes)
+        _cut_at_edge(network, part, shapes)
+    return shapes
 
 
-class CornerRays(NamedTuple):
-    """The rays of the three corners of a triangle."""
+def _middles(corner: Array, radius: Array, inscribed: Array) -> Array:
+    """Centres (K, 2) m of the circles of radius `inscribed` (K,) m that touch three discs.
 
-    corner: Array
-    """(3, 3): the angle rad, and the distances m to the next two corners."""
-    ray: Array
-    """(3, 3, 12): the far side m, and the cosines of the angles to these two."""
-    reach: Array
-    """(3, 12) m, where the rays end."""
+    Their radii are `radius` (K, 3) m, and they stand on the first three of `corner` (K, 4, 2) m.
+    From |x - p_i| = s + r_i at the three corners, by differences.
+    """
+    (a, _), (px, py) = corner[:, 1].T, corner[:, 2].T
+    own, second, third = ((inscribed + one) ** 2 for one in radius.T)
+    x = 0.5 * (a * a + own - second) / a
+    return np.column_stack([x, (0.5 * (px * px + py * py + own - third) - px * x) / py])
+
+
+def _cut_at_wall(network: Network, part: slice, shapes: Shapes) -> None:
+    """Sets the polygons of throats that one wall cuts."""
+    single = np.flatnonzero(network.throat_share[part] == 0.5)
+    place, tolerance = network.corners_of(part)[single], TOLERANCE * network.grain_radius
+    own = network.throat_grains[part][single]
+    sides = [axis for axis in (1, 2) if not network.periodic[axis]]
+    for one, other, third in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        apart = place[:, other] - place[:, one]
+        pair = [_mirrored(apart, axis, tolerance) for axis in sides]
+        cut = (own[:, one] == own[:, other]) & np.any(pair, axis=0)
+        t = single[cut]
+        first, second, j = (shapes.corner[t, k].copy() for k in (one, other, third))
+        foot, inward = 0.5 * (first + second), 0.5 * (first - second)
+        inward /= np.linalg.norm(inward, axis=1)[:, None]
+        height = np.sum((j - foot) * inward, axis=1)
+        beyond, flat = (height < -tolerance)[:, None], np.abs(height) <= tolerance
+        first, inward = np.where(beyond, second, first), np.where(beyond, -inward, inward)
+        other_foot = j - np.abs(height)[:, None] * inward
+        shapes.body[t, np.where(beyond[:, 0], one, other), 3] = 0.0
+        four = np.stack([first, j, other_foot, foot], axis=1)
+        three = np.stack([first, j, foot, foot], axis=1)
+        shapes.corner[t] = np.where(flat[:, None, None], three, four)
+        shapes.corners[t], shapes.part[t] = np.where(flat, 3, 4), np.where(flat, 2.0, 1.0)
+        shapes.middle[t] = shapes.corner[t].mean(axis=1)
+        _set_wall(shapes, t, 3, 0.5 * (foot + other_foot), -inward)
+
+
+def _cut_at_edge(network: Network, part: slice, shapes: Shapes) -> None:
+    """Sets the polygons of throats on an edge of two walls.
+
+    Only grains centred on walls have other throats there, which keep their triangle.
+    """
+    double = np.flatnonzero(network.throat_share[part] == 0.25)
+    place, tolerance = network.corners_of(part)[double], TOLERANCE * network.grain_radius
+    shapes.part[double] = DOUBLE_EDGE_SHARE
+    for i, j, k in ((0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):
+        right = _mirrored(place[:, j] - place[:, i], 1, tolerance)
+        right &= _mirrored(place[:, k] - place[:, i], 2, tolerance)
+        t = double[right]
+        own, one, two = (shapes.corner[t, corner].copy() for corner in (i, j, k))
+        feet, far = (0.5 * (own + one), 0.5 * (own + two)), 0.5 * (one + two)
+        shapes.body[t, j, 3] = shapes.body[t, k, 3] = 0.0
+        shapes.corner[t] = np.stack([own, feet[0], far, feet[1]], axis=1)
+        shapes.corners[t], shapes.part[t] = 4, 2.0
+        shapes.middle[t] = shapes.corner[t].mean(axis=1)
+        for number, foot in enumerate(feet):
+            outward = foot - own
+            outward /= np.linalg.norm(outward, axis=1)[:, None]
+            _set_wall(shapes, t, 3 + number, 0.5 * (foot + far), outward)
+
+
+def _mirrored(apart: Array, axis: int, tolerance: float) -> Array:
+    """Whether steps (K, 3) m lead across a wall normal to an axis, and along no other one."""
+    rest = np.delete(apart, axis, axis=1)
+    return np.all(np.abs(rest) <= tolerance, axis=1) & (np.abs(apart[:, axis]) > tolerance)
+
+
+def _set_wall(shapes: Shapes, throats: Array, number: int, place: Array, outward: Array) -> None:
+    """Sets a body to the disc that stands for the wall through `place` (K, 2) m."""
+    away = shapes.corner[throats] - shapes.middle[throats, None]
+    radius = 2.0 * HUGE * np.linalg.norm(away, axis=2).max(axis=1)
+    shapes.body[throats, number, :2] = place + radius[:, None] * outward
+    shapes.body[throats, number, 3] = radius
+
+
+# ------------------------------------------------------------------------------------------------
+# The flow through one polygon between any number of discs, summed over rays.
+
+
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
+HALF = len(POINTS)
+RAYS = 2 * HALF
+"""Rays of a disc to each far side."""
+NEAR_END = 0.05
+"""Least share of a far side that half of the rays end on."""
+ON_SIDE = 1e-9
+"""A disc centred nearer to a side than this share of the side lies on it."""
+
+
+class RayRoom(NamedTuple):
+    """Room for the rays of the discs that the sections of a throat meet, D at most."""
+
+    side: Array
+    """(4, 3) of `set_sides`."""
+    rays: Array
+    """(D, 7, 48) of `aim`."""
+    number: Array
+    """(D,) of rays of each disc; -1 before they are aimed."""
+    longest: Array
+    """(D,) m, the farthest end of the rays of each disc."""
+    which: Array
+    """(D,) the discs that a section meets."""
+    disc: Array
+    """(D, 4): their centres x and y, and radii, m, and flatness."""
     part: Array
-    """(12,) m4, the fluxes of the rays of one corner."""
+    """(48,) for `flux_on_rays`."""
 
 
-def corner_rays() -> CornerRays:
-    """Room for the rays of a section."""
-    return CornerRays(
-        corner=np.empty((3, 3)),
-        ray=np.empty((3, 3, RAYS)),
-        reach=np.empty((3, RAYS)),
-        part=np.empty(RAYS),
+def ray_room(most: int) -> RayRoom:
+    """Room for the bodies of a throat and `most` spheres near it."""
+    most += MOST_BODIES
+    return RayRoom(
+        side=np.empty((4, 3)),
+        rays=np.empty((most, 7, 4 * RAYS)),
+        number=np.full(most, -1),
+        longest=np.empty(most),
+        which=np.empty(most, np.int64),
+        disc=np.empty((most, 4)),
+        part=np.empty(4 * RAYS),
     )
 
 
 @loops_inside
-def aim_corners(base: Array, rays: CornerRays) -> None:
-    """Sets up the rays of the corners of a triangle `base` (3, 2) m."""
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        jx, jy = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
-        kx, ky = base[k, 0] - base[i, 0], base[k, 1] - base[i, 1]
-        aj, ak = np.sqrt(jx * jx + jy * jy), np.sqrt(kx * kx + ky * ky)
-        across = np.sqrt((kx - jx) ** 2 + (ky - jy) ** 2)
-        twice, inner = abs(jx * ky - jy * kx), jx * kx + jy * ky
-        height, foot = twice / across, -(jx * (kx - jx) + jy * (ky - jy)) / across
-        opening = np.arctan2(twice, inner)
-        rays.corner[i, 0], rays.corner[i, 1], rays.corner[i, 2] = opening, aj, ak
-        far, to_j, to_k = rays.ray[i, 0], rays.ray[i, 1], rays.ray[i, 2]
-        for p in range(len(far)):
-            turn = 0.5 * opening * (1.0 + FINE_POINTS[p]) - QUARTER
-            cosine, sine = -sine_of(turn), cosine_of(turn)
-            far[p] = height / max((cosine * height + sine * foot) / aj, STEEPEST)
-            to_j[p] = cosine
-            to_k[p] = (cosine * inner + sine * twice) / (aj * ak)
-
-
-@loops_inside
-def corner_flux(rays: CornerRays, disc: Array, table: Array) -> float:
-    """Flux m4 on the rays from discs of the radii `disc` (3,) m to the lines midway."""
-    total, part = 0.0, rays.part
-    for i in range(3):
-        corner, ray, reach = rays.corner[i], rays.ray[i], rays.reach[i]
-        far, to_j, to_k = ray[0], ray[1], ray[2]
-        aj, ak = corner[1], corner[2]
-        ej, ek = disc[(i + 1) % 3] - disc[i], disc[(i + 2) % 3] - disc[i]
-        half_j, half_k = 0.5 * (aj * aj - ej * ej), 0.5 * (ak * ak - ek * ek)
-        for p in range(len(reach)):
-            before = midway(half_j, aj * to_j[p] + ej), midway(half_k, ak * to_k[p] + ek)
-            reach[p] = min(far[p], before[0], before[1])
-        for p in range(len(reach)):
-            part[p] = FINE_WEIGHTS[p] * flux_on_ray(reach[p], disc[i])
-        flux, nearest = 0.0, np.inf
-        for p in range(len(reach)):
-            flux += part[p]
-            nearest = min(nearest, reach[p])
-        if flux > 0.0:
-            closest = min(disc[i] / nearest, 1.0) if nearest > 0.0 else 1.0
-            angle = 0.5 * corner[0]
-            total += angle * flux * shear_ratio(angle, closest, table)
-    return total
-
-
-# ------------------------------------------------------------------------------------------------
-# The flow through a triangle between any number of discs, summed over rays.
-#
-# Every disc keeps what its rays see inside the triangle, from its rim or from where they enter the
-# triangle to the far side, or to the line midway to the rim of another disc. The rays end in
-# Gauss's points on the far sides, so the sum does not depend on the order of the corners and is
-# the same for a mirrored triangle.
-
-
-SECTOR = np.pi / 3.0
-"""Half angle, rad, between two of the three rims that surround a disc."""
-ON_SIDE = 1e-9
-"""A disc centred nearer to a side than this share of the side lies on it."""
-UNTOUCHED, NARROWED, SWALLOWED = 0, 1, 2
-"""What another disc does to the rays of a disc."""
-
-
-@loops_inside
 def set_sides(base: Array, side: Array) -> None:
-    """Sets `side` (3, 3): of each side of a triangle `base` (3, 2) m its normal inwards, length m.
+    """Sets `side` (n, 3): of each side of a polygon `base` (n, 2) m its normal inwards, length m.
 
-    The normal is a unit vector.
+    The polygon is convex, and the normal a unit vector.
     """
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
+    many = len(base)
+    for i in range(many):
+        j, k = (i + 1) % many, (i + 2) % many
         ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
         length = np.sqrt(ex * ex + ey * ey)
         nx, ny = -ey / length, ex / length
@@ -167,44 +254,44 @@ def inwards(base: Array, side: Array, i: int, x: float, y: float) -> float:
 
 
 @loops_inside
-def depth_within(base: Array, side: Array, x: float, y: float) -> float:
-    """How far m a place lies within a triangle, from the nearest side line; negative outside.
-
-    A disc that is no larger than its place is far outside does not reach in.
-    """
-    least = np.inf
-    for i in range(3):
-        least = min(least, inwards(base, side, i, x, y))
-    return least
-
-
-@loops_inside
-def aim(base: Array, side: Array, x: float, y: float, rays: Array) -> int:
+def aim(base: Array, side: Array, middle: Array, x: float, y: float, rays: Array) -> int:
     """Sets up the rays of a disc centred at `x`, `y` m, 12 to each far side; gives their number.
 
-    `side` is what `set_sides` sets. The rows of `rays` (6, 36) are the direction, where a ray
-    meets the far side and where it enters the triangle, m, its angle rad, and room.
+    Half of them pass on either side of the `middle` (2,) m, where the flux has a peak. `side` is
+    what `set_sides` sets. The rows of `rays` (7, 48) are the direction, where a ray
+    meets the far side and where it enters the polygon, m, its angle rad, and room.
     """
-    first = 0
-    for far in range(3):
+    first, many, lead = 0, len(base), np.int64(0)
+    for i in range(many):  # the first far side, so that neighbouring rays are neighbours
+        here = inwards(base, side, i, x, y) > ON_SIDE * side[i, 2]
+        if here and inwards(base, side, i - 1, x, y) <= ON_SIDE * side[i - 1, 2]:
+            lead = np.int64(i)
+    for place in range(lead, lead + many):
+        far = place % many
         depth = inwards(base, side, far, x, y)
         if depth <= ON_SIDE * side[far, 2]:
             continue
-        one = (far + 1) % 3
+        one = (far + 1) % many
         ex, ey = base[one, 0] - base[far, 0], base[one, 1] - base[far, 1]
         vx, vy = base[far, 0] - x, base[far, 1] - y
         of_turn = 0.5 * side[far, 2] * depth
         ux, uy, end = rays[0, first:], rays[1, first:], rays[2, first:]
         entry, turn = rays[3, first:], rays[4, first:]
+        dx, dy = middle[0] - x, middle[1] - y
+        across = dx * ey - dy * ex
+        there = abs(across) <= ON_SIDE * side[far, 2] ** 2  # the disc is centred in the middle
+        split = 0.5 if there else (dy * vx - dx * vy) / across
+        split = split if NEAR_END < split < 1.0 - NEAR_END else 0.5
         for p in range(min(RAYS, len(entry))):
-            along = 0.5 * (1.0 + FINE_POINTS[p])
+            low, wide = (0.0, split) if p < HALF else (split, 1.0 - split)
+            along = low + 0.5 * wide * (1.0 + POINTS[p % HALF])
             rx, ry = vx + along * ex, vy + along * ey
             long = np.sqrt(rx * rx + ry * ry)
             ux[p], uy[p], end[p] = rx / long, ry / long, long
             entry[p] = 0.0
-            turn[p] = of_turn * FINE_WEIGHTS[p] / (long * long)
-        for near in range(1, 3):
-            i = (far + near) % 3
+            turn[p] = of_turn * wide * WEIGHTS[p % HALF] / (long * long)
+        for near in range(1, many):
+            i = (far + near) % many
             away = -inwards(base, side, i, x, y)
             if away > ON_SIDE * side[i, 2]:
                 nx, ny = side[i, 0], side[i, 1]
@@ -217,478 +304,194 @@ def aim(base: Array, side: Array, x: float, y: float, rays: Array) -> int:
 
 
 @loops_inside
-def end_midway(
-    rays: Array,
-    count: int,
-    x: float,
-    y: float,
-    radius: float,
-    other_x: float,
-    other_y: float,
-    other_radius: float,
-) -> int:
-    """Ends the first `count` rays of a disc midway to another one; centre and radius m of both.
+def end_midway(rays: Array, count: int, disc: Array, other: Array, number: int) -> bool:
+    """Ends the first `count` rays of a disc midway to another one, both (4,) of a room's discs.
 
-    The last row of `rays` (6, 36) holds where they end. Returns what the other disc does.
+    The last rows of `rays` (7, 48) hold where they end and by what: twice the `number` of the
+    other disc, and 1 more on the right of it. Returns whether the disc lies in the other.
     """
-    qx, qy, wider = other_x - x, other_y - y, other_radius - radius
+    qx, qy, wider = other[0] - disc[0], other[1] - disc[1], other[2] - disc[2]
     square = qx * qx + qy * qy
     if wider > 0.0 and square <= wider * wider:
-        return SWALLOWED
-    half = 0.5 * (square - wider * wider)
-    ux, uy, reach = rays[0], rays[1], rays[5]
+        return True
+    half, code = 0.5 * (square - wider * wider), 2.0 * number
+    ux, uy, reach, what = rays[0], rays[1], rays[5], rays[6]
     for p in range(count):
-        reach[p] = min(reach[p], midway(half, qx * ux[p] + qy * uy[p] + wider))
-    return NARROWED
+        below = qx * ux[p] + qy * uy[p] + wider
+        way = half / below
+        way = max(way, 0.0) if below > 0.0 else np.inf
+        own = code if qx * uy[p] > qy * ux[p] else code + 1.0
+        what[p] = own if way < reach[p] else what[p]
+        reach[p] = min(reach[p], way)
+    return False
 
 
 @loops_inside
-def flux_on_rays(rays: Array, count: int, own: float, part: Array, table: Array) -> float:
-    """Flux m4 on the first `count` rays of a disc of radius `own` m, to where they end.
+def flux_on_rays(
+    rays: Array, count: int, number: int, around: bool, room: RayRoom, table: Array
+) -> tuple[float, float]:
+    """Flux m4 on the first `count` rays of the disc `number`, to where they end.
 
-    `rays` (6, 36) is what `aim` and `end_midway` set, `part` (36,) is written to. A ray that
-    enters the triangle outside its disc carries the part from there of what `flux_on_ray` sums
-    from the rim.
+    `rays` (7, 48) is what `aim` and `end_midway` set. A ray that enters the polygon outside its
+    disc carries the part from there of what an annulus carries from the rim. Neighbouring rays
+    that one other disc ends, on one side of it, are a wedge, and so are those that end on one side
+    of the polygon. Wedges of rays `around` the disc, whose first is anyone, end at each far side.
+    The second flux is that without the shear between rays.
     """
-    entry, turn, reach = rays[3], rays[4], rays[5]
+    entry, turn, reach, what, part = rays[3], rays[4], rays[5], rays[6], room.part
+    x, y, own = room.disc[number, 0], room.disc[number, 1], room.disc[number, 2]
     r2, farthest = own * own, 0.0
-    for p in range(count):
-        start = max(entry[p], own)
-        d2, t2 = reach[p] * reach[p], start * start
-        whole = d2 * d2 * (0.25 * log_of(reach[p] / own) - 3.0 / 16.0) + r2 * d2 / 8.0
-        part[p] = whole + d2 * t2 / 8.0 + t2 * t2 / 16.0 - r2 * t2 / 8.0
-    for p in range(count):
-        farthest = max(farthest, entry[p])
-    if farthest > own:
+    if room.disc[number, 3] == 0.0:  # a wall, from which all rays start: the flux as a series
+        for p in range(count):
+            gap = (reach[p] - own) * (reach[p] + own) / r2
+            part[p] = r2 * r2 * gap**3 * (1.0 / 24.0 - gap * (1.0 / 96.0 - gap / 240.0))
+    else:
         for p in range(count):
             start = max(entry[p], own)
-            part[p] -= 0.25 * (reach[p] * start) ** 2 * log_of(start / own)
-    total, nearest = 0.0, np.inf
+            d2, t2 = reach[p] * reach[p], start * start
+            whole = d2 * d2 * (0.25 * log_of(reach[p] / own) - 3.0 / 16.0) + r2 * d2 / 8.0
+            part[p] = whole + d2 * t2 / 8.0 + t2 * t2 / 16.0 - r2 * t2 / 8.0
+        for p in range(count):
+            farthest = max(farthest, entry[p])
+        if farthest > own:
+            for p in range(count):
+                start = max(entry[p], own)
+                part[p] -= 0.25 * (reach[p] * start) ** 2 * log_of(start / own)
+    total, on_rays, wedge, angle, nearest = 0.0, 0.0, 0.0, 0.0, np.inf
     for p in range(count):
+        angle += turn[p]
         if reach[p] > max(entry[p], own):
-            total += turn[p] * part[p]
+            wedge += turn[p] * part[p]
             nearest = min(nearest, reach[p])
-    return total * shear_ratio(SECTOR, min(own / nearest, 1.0), table) if total > 0.0 else 0.0
+        ends = (p + 1) % RAYS == 0 and (around or what[p] < 0.0)
+        if ends or p + 1 == count or what[p + 1] != what[p]:
+            if wedge > 0.0:
+                if what[p] >= 0.0:  # the point midway on the line between the centres
+                    other = room.disc[int(what[p]) // 2]
+                    apart = np.sqrt((other[0] - x) ** 2 + (other[1] - y) ** 2)
+                    nearest = 0.5 * (apart - other[2] + own)
+                closest = min(own / nearest, 1.0) if nearest > 0.0 else 1.0
+                total += wedge * shear_ratio(angle, closest, table)
+            on_rays += wedge
+            wedge, angle, nearest = 0.0, 0.0, np.inf
+    return total, on_rays
 
 
-# ------------------------------------------------------------------------------------------------
-# Flow along the axis through a section with a disc of each grain on its corners.
-#
-# Every disc slows the fluid between its rim and the line midway to the next rim; these shares are
-# cut into wedges (`wedges`).
-#
-# The line midway between two rims is a hyperbola. From the centre of a disc it lies at the
-# distance d(t) = (a^2 - e^2) / (2 (a cos t + e)) on the ray at the angle t from the line between
-# the centres, with the difference e of the radii and the distance a of the centres. The shares
-# meet in the centre of the circle that touches all three discs. The flux on rays is summed by
-# Gauss points, and the shear between rays is that of the wedge of the same angle and half gap.
-#
-# Where that circle lies beyond an edge, as in every obtuse triangle with equal discs, the shares
-# there are negative, and they take away too much: all of the flux between touching discs at an
-# angle of 98 degrees. Where no circle touches all three discs (one disc lies in the shadow of the
-# others), there is no such sum. In both cases each disc keeps what its rays see of the triangle
-# before a line midway or the opposite side, if that is more. So that the flux does not jump, the
-# rays take over while the centre moves beyond the edge by `TURN`, as seen from the centre of a
-# disc.
+@loops_inside
+def flux_among(
+    base: Array, middle: Array, count: int, room: RayRoom, table: Array
+) -> tuple[float, float]:
+    """Flux m4 of laplacian(w) = -1 through a polygon, whose sides are set, among `count` discs.
+
+    The second flux is that without the shear between rays.
+    """
+    total, on_rays = 0.0, 0.0
+    for number in range(count):
+        disc, slot = room.disc[number], room.which[number]
+        rays = room.rays[slot]
+        if room.number[slot] < 0:
+            room.number[slot] = aim(base, room.side, middle, disc[0], disc[1], rays)
+            room.longest[slot] = 0.0
+            for p in range(room.number[slot]):
+                room.longest[slot] = max(room.longest[slot], rays[2, p])
+        many, longest = room.number[slot], room.longest[slot]
+        for p in range(many):
+            rays[5, p], rays[6, p] = rays[2, p], -1.0
+        swallowed = False
+        for k in range(count):
+            other = room.disc[k]
+            apart = np.sqrt((other[0] - disc[0]) ** 2 + (other[1] - disc[1]) ** 2)
+            # the nearest point midway is on the line between the centres
+            if k != number and not swallowed and apart - other[2] + disc[2] < 2.0 * longest:
+                swallowed = end_midway(rays, many, disc, other, k)
+        if many > 0 and not swallowed:
+            one, plain = flux_on_rays(rays, many, number, many == RAYS * len(base), room, table)
+            total, on_rays = total + one, on_rays + plain
+    return total, on_rays
 
 
-TURN = 0.05
-"""Angle, rad, seen from the centre of a disc: where the centre of the circle lies so far beyond an
-edge, the rays have taken over. Finite elements agree with them there (test_section_flux.py)."""
+@loops_inside
+def meet(bodies: Array, z: float, tip: float, first: int, count: int, room: RayRoom) -> int:
+    """Adds the discs of `bodies` (N, 5) in the section at `z` m to the first `count`.
+
+    A body that the section misses has a disc of `tip` radii, or none where that is 0. `first` is
+    the place of the bodies' rays. Returns the number of discs.
+    """
+    for i in range(len(bodies)):
+        whole = bodies[i, 3] ** 2
+        square = whole - bodies[i, 4] * (bodies[i, 2] - z) ** 2
+        square = max(square, tip * tip * whole)
+        if square > 0.0:
+            own = room.disc[count]
+            room.which[count] = first + i
+            own[0], own[1], own[2] = bodies[i, 0], bodies[i, 1], np.sqrt(square)
+            own[3] = bodies[i, 4]
+            count += 1
+    return count
 
 
-class DiscRoom(NamedTuple):
-    """Room for `disc_fluxes`."""
-
-    wedge: Array
-    """(7, 6 n): of each wedge the excess of the radius of the other disc, half the gap squared,
-    the distance of the centres, the place of the circle along their line and across it, which
-    becomes its angle rad, the own radius, and the flux on rays."""
-    edges: Array
-    """(6, 4), from each corner to the two others: unit vector, length m, and 1 where the third
-    corner lies to the left, else -1."""
-    rays: CornerRays
-
-
-def disc_room(count: int) -> DiscRoom:
-    """Room for `count` sections."""
-    return DiscRoom(wedge=np.empty((7, 6 * count)), edges=np.empty((6, 4)), rays=corner_rays())
+BEYOND, EVERYWHERE, OPEN = 0, 1, 2
+"""Where spheres around count: in sections that one of the spheres at the corners does not reach,
+in all, or in all and as the spheres at the corners do."""
 
 
 @loops_in_place
-def disc_fluxes(
-    rows: Array, sections: Sections, base: Array, table: Array, room: DiscRoom, flux: Array
+def _set_fluxes(
+    sections: Sections,
+    shapes: Shapes,
+    first: Array,
+    place: Array,
+    kind: int,
+    table: Array,
+    room: RayRoom,
+    flux: Array,
+    left: Array,
 ) -> None:
-    """Writes the `flux` (S, n) m4 of laplacian(w) = -1 in the sides `rows` between three discs.
-
-    The first corner of a facet is the origin, the second lies on the x axis. The flux is 0 where
-    the discs close the triangle.
-
-    Args:
-        rows: numbers of the sides.
-        sections: of all sides.
-        base: (K, 3, 2) m, corners of the facets.
-        table: of `shear_ratio`.
-        room: written to.
-        flux: of all sides.
-    """
-    aimed = -1
-    for s in rows:
+    before = -1
+    for s in range(len(flux)):
         t = sections.throat[s]
-        disc, out = sections.disc[s], flux[s]
-        touching_fluxes(base[t], disc, table, room, out)
-        for k in range(len(out)):
-            beyond = 0.0 if out[k] > 0.0 else TURN
-            for m in range(6 * k, 6 * k + 6):
-                beyond = max(beyond, -room.wedge[4, m])
-            if beyond > 0.0:
-                if aimed != t:
-                    aim_corners(base[t], room.rays)
-                    aimed = t
-                more = corner_flux(room.rays, disc[:, k], table) - out[k]
-                out[k] += min(beyond / TURN, 1.0) * max(more, 0.0)
+        base, own = shapes.corner[t, : shapes.corners[t]], shapes.body[t]
+        middle = shapes.middle[t]
+        others = place[first[t] : first[t + 1]]
+        if t != before:
+            before = t
+            set_sides(base, room.side)
+            for i in range(len(others) + MOST_BODIES):
+                room.number[i] = -1
+        for k in range(flux.shape[1]):
+            z = (2.0 * sections.side[s] - 1.0) * (sections.low[s] + k * sections.step[s])
+            if kind == OPEN:
+                count = meet(own, z, 0.0, 0, 0, room)
+                count = meet(others, z, 0.0, MOST_BODIES, count, room)
+                if count > 0:
+                    flux[s, k], left[s, k] = flux_among(base, middle, count, room, table)
+                    continue
+            count, wanted = meet(own, z, TIP, 0, 0, room), kind == EVERYWHERE
+            flux[s, k], clear = flux_among(base, middle, count, room, table)
+            left[s, k] = 1.0
+            for i in range(3):
+                wanted = wanted or (own[i, 2] - z) ** 2 > own[i, 3] ** 2 > 0.0
+            if wanted and len(others) > 0 and flux[s, k] > 0.0:
+                more = meet(others, z, 0.0, MOST_BODIES, count, room)
+                if more > count:
+                    among = flux_among(base, middle, more, room, table)[1]
+                    left[s, k] = min(among / clear, 1.0)
 
 
-@loops_inside
-def touching_fluxes(base: Array, disc: Array, table: Array, room: DiscRoom, flux: Array) -> None:
-    """Writes the flux (n,) m4 where a circle touches all three discs (3, n) m, else 0.
+def section_fluxes(
+    shapes: Shapes, sections: Sections, around: SpheresBeside | None = None, kind: int = BEYOND
+) -> tuple[Array, Array]:
+    """Fluxes (S, n) m4 among the own bodies of throats, and the share that spheres around leave.
 
-    Shares are negative where the circle lies beyond an edge of the triangle.
+    The share is that of the fluxes on rays, for the wedges about a sphere among others are no
+    wedges of the table. Adding a solid never adds flow, so it is at most 1. For `OPEN` the first
+    are the fluxes among all spheres, and a sphere at a corner has no disc beyond its reach.
     """
-    wedge, edges = room.wedge, room.edges
-    for i in range(3):
-        for step in range(1, 3):
-            j, k = (i + step) % 3, (i + 3 - step) % 3
-            ex, ey = base[j, 0] - base[i, 0], base[j, 1] - base[i, 1]
-            a = np.sqrt(ex * ex + ey * ey)
-            turned = ex * (base[k, 1] - base[i, 1]) - ey * (base[k, 0] - base[i, 0])
-            edge = edges[2 * i + step - 1]
-            edge[0], edge[1], edge[2], edge[3] = ex / a, ey / a, a, 1.0 if turned > 0.0 else -1.0
-    for k in range(len(flux)):
-        touches = _set_wedges(edges, base, disc[:, k], wedge[:, 6 * k : 6 * k + 6])
-        flux[k] = 1.0 if touches else 0.0
-    _sum_wedges(wedge, 6 * len(flux))
-    wider, apart, turn, own, total = wedge[0], wedge[2], wedge[4], wedge[5], wedge[6]
-    for k in range(len(flux)):
-        if flux[k] > 0.0:
-            flux[k] = 0.0
-            for m in range(6 * k, 6 * k + 6):
-                disc_of_gap = own[m] / (0.5 * (apart[m] - wider[m]))
-                flux[k] += total[m] * shear_ratio(abs(turn[m]), disc_of_gap, table)
-
-
-@loops_inside
-def _set_wedges(edges: Array, base: Array, disc: Array, wedge: Array) -> bool:
-    """Sets five rows and the own radius of six wedges; whether a circle touches three discs."""
-    cx, cy, radius = _inscribed(base, disc)
-    touches = not np.isnan(radius)
-    if not touches:
-        cx, cy = 0.0, 0.0
-    for i in range(3):
-        vx, vy = cx - base[i, 0], cy - base[i, 1]
-        away = np.sqrt(vx * vx + vy * vy)
-        for m in (2 * i, 2 * i + 1):
-            a, wider = edges[m, 2], disc[(i + 1 + m - 2 * i) % 3] - disc[i]
-            along = edges[m, 0] * vx + edges[m, 1] * vy
-            wedge[0, m], wedge[1, m], wedge[2, m] = wider, 0.5 * (a * a - wider * wider), a
-            wedge[3, m] = along
-            wedge[4, m] = edges[m, 3] * (edges[m, 0] * vy - edges[m, 1] * vx)
-            wedge[5, m] = disc[i]
-            touches = touches and a > wider and a * along + wider * away > 0.0
-    return touches
-
-
-@loops_inside
-def _sum_wedges(wedge: Array, count: int) -> None:
-    """Turns the places of the circles into angles rad, and sums the flux m4 on rays up to them."""
-    wider, gap, apart, along = wedge[0], wedge[1], wedge[2], wedge[3]
-    turn, own, total = wedge[4], wedge[5], wedge[6]
-    for m in range(count):
-        turn[m] = angle_of(turn[m], along[m])
-        total[m] = 0.0
-    for p in range(len(POINTS)):
-        part, weight = 0.5 * (1.0 + POINTS[p]), 0.5 * WEIGHTS[p]
-        for m in range(count):
-            cosine = -sine_of(part * abs(turn[m]) - QUARTER)
-            reach = gap[m] / (apart[m] * cosine + wider[m])
-            total[m] += weight * turn[m] * flux_on_ray(reach, own[m])
-
-
-@loops_inside
-def _inscribed(base: Array, disc: Array) -> tuple[float, float, float]:
-    """Centre and radius m of the circle that touches three discs; NaN where there is none."""
-    a, px, py = base[1, 0], base[2, 0], base[2, 1]
-    r0, r1, r2 = disc[0], disc[1], disc[2]
-    ax = 0.5 * (a * a + r0 * r0 - r1 * r1) / a
-    bx = -(r1 - r0) / a
-    ay = (0.5 * (px * px + py * py + r0 * r0 - r2 * r2) - px * ax) / py
-    by = (-(r2 - r0) - px * bx) / py
-    square = bx * bx + by * by - 1.0
-    half = r0 - ax * bx - ay * by
-    rest = ax * ax + ay * ay - r0 * r0
-    under = half * half - square * rest
-    if under < 0.0:
-        return 0.0, 0.0, np.nan
-    below = half + np.sqrt(under)
-    if below == 0.0:
-        return 0.0, 0.0, np.nan
-    radius = rest / below
-    if radius <= -min(r0, r1, r2):
-        return 0.0, 0.0, np.nan
-    return ax + bx * radius, ay + by * radius, radius
-
-
-# ------------------------------------------------------------------------------------------------
-# Flow along the axis through a section of a throat that a side wall cuts and holds still.
-#
-# The facet of the throat has a grain i, its mirror image across the wall, and a grain j or its
-# image as corners. Its plane is normal to the wall, and inside the box every section parallel to
-# it is the trapezoid between the centres of two discs and their feet on the wall.
-#
-# Discs and wall share the fluid as discs do. The line midway between the rims of i and j
-# is a hyperbola. The line midway between the rim of i (radius rho, centre H above the wall) and
-# the wall is a parabola: on the ray at the angle t from the normal of the wall it lies at the
-# distance (H + rho) / (1 + cos t) from the centre; at the distance x from the foot of i its height
-# above the wall is (x^2 + H^2 - rho^2) / (2 (H + rho)). The lines meet in the centre of the circle
-# that touches discs and wall. The share of the wall is a plane film, with the flux y^3 / 3 per
-# length for a film of thickness y. Where that centre lies outside the trapezoid, every ray still
-# ends at the nearest of these lines or of the sides of the trapezoid: no share is negative, none
-# is missing.
-
-
-DOUBLE_EDGE_SHARE = 0.25
-"""Part of the slipping flux that a throat carries which two walls cut between several grains."""
-TOLERANCE = 1e-9
-"""Lengths up to this many mean grain radii are 0, and sines up to this are taken as this."""
-LANES = 6
-"""Numbers a section for which `wall_fluxes` needs room."""
-
-
-class WallCuts(NamedTuple):
-    """How walls that hold the fluid cut each of K throats."""
-
-    order: Array
-    """(K, 2) which corners of the facet are i and j. On an edge j is -1, and both are -1 where no
-    wall cuts the throat."""
-    place: Array
-    """(K, 3) m, heights of i and j above the wall, and their distance along it; on an edge heights
-    of i above both walls, and 0."""
-    part: Array
-    """(K,) flux of the whole throat over that of the half-section, quarter-section, or slipping
-    section."""
-
-
-def wall_cuts(network: Network) -> WallCuts:
-    """How walls that hold the fluid cut each throat.
-
-    A trapezoid is two triangles, each with share 1/2, so each carries the half-section; a triangle
-    with j on the wall is alone and carries two. The rectangle of an edge (`edge_fluxes`) is
-    two triangles, each with share 1/4, so each carries two quarter-sections. Only grains centred
-    on walls have other edges; their throats carry `DOUBLE_EDGE_SHARE` of the slipping flux.
-    """
-    count = len(network.throat_share)
-    order, place, part = np.full((count, 2), -1), np.zeros((count, 3)), np.ones(count)
-    if network.walls == "slip":
-        return WallCuts(order, place, part)
-    single, double = (np.flatnonzero(network.throat_share == share) for share in (0.5, 0.25))
-    corner, tolerance = network.corners_of(single), TOLERANCE * network.grain_radius
-    own = network.image_grain[network.throat_images[single]]
-    sides = [axis for axis in (1, 2) if not network.periodic[axis]]
-    for i, image, j in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        apart = corner[:, image] - corner[:, i]
-        for axis in sides:
-            pair = (own[:, i] == own[:, image]) & _mirrored(apart, axis, tolerance)
-            t = single[pair]
-            across = corner[pair, j] - 0.5 * (corner[pair, i] + corner[pair, image])
-            height = np.abs(across[:, axis])
-            order[t] = i, j
-            place[t, 0], place[t, 1] = 0.5 * np.abs(apart[pair, axis]), height
-            place[t, 2] = np.linalg.norm(np.delete(across, axis, axis=1), axis=1)
-            part[t] = np.where(height <= tolerance, 2.0, 1.0)
-    part[double] = DOUBLE_EDGE_SHARE
-    corner = network.corners_of(double)
-    for i, j, k in ((0, 1, 2), (0, 2, 1), (1, 0, 2), (1, 2, 0), (2, 0, 1), (2, 1, 0)):
-        one, two = corner[:, j] - corner[:, i], corner[:, k] - corner[:, i]
-        right = _mirrored(one, 1, tolerance) & _mirrored(two, 2, tolerance)
-        t = double[right]
-        order[t, 0], part[t] = i, 2.0
-        place[t, 0], place[t, 1] = 0.5 * np.abs(one[right, 1]), 0.5 * np.abs(two[right, 2])
-    return WallCuts(order, place, part)
-
-
-def _mirrored(apart: Array, axis: int, tolerance: float) -> Array:
-    """Whether steps (K, 3) m lead across a wall normal to an axis, and along no other one."""
-    rest = np.delete(apart, axis, axis=1)
-    return np.all(np.abs(rest) <= tolerance, axis=1) & (np.abs(apart[:, axis]) > tolerance)
-
-
-@loops_in_place
-def wall_fluxes(
-    rows: Array, sections: Sections, cuts: WallCuts, table: Array, lanes: Array, flux: Array
-) -> None:
-    """Writes the `flux` (S, n) m4 of the sides `rows` between a wall and two discs.
-
-    `lanes` (`LANES`, n) is written to; the others are as in `disc_fluxes`.
-    """
-    for s in rows:
-        t = sections.throat[s]
-        place, out = cuts.place[t], flux[s]
-        one, two = sections.disc[s, cuts.order[t, 0]], sections.disc[s, cuts.order[t, 1]]
-        along, above, split, share = lanes[0], lanes[1], lanes[2], lanes[3]
-        first, last = lanes[4], lanes[5]
-        apart = np.hypot(place[2], place[0] - place[1])
-        # where the parabolas meet, along the wall and above it; midway where they do not
-        for k in range(len(out)):
-            wide, wide_2 = place[0] + one[k], place[1] + two[k]
-            near, far = place[0] ** 2 - one[k] ** 2, place[1] ** 2 - two[k] ** 2
-            middle = wide * place[2]
-            rest = wide_2 * near - wide * (place[2] ** 2 + far)
-            square = middle**2 - (wide_2 - wide) * rest
-            meeting = -rest / (middle + np.sqrt(max(square, 0.0)))
-            along[k] = meeting if square >= 0.0 else 0.5 * place[2]
-            above[k] = 0.5 * (along[k] ** 2 + near) / wide
-            out[k] = 0.0
-        for i in range(2):
-            height, other = place[i], place[1 - i]
-            disc, next_disc = (one, two) if i == 0 else (two, one)
-            edge = np.arctan2(place[2], height - other)
-            upright = (height - other) / apart
-            for k in range(len(out)):
-                x = along[k] if i == 0 else place[2] - along[k]
-                split[k] = min(max(angle_of(x, height - above[k]), 0.0), edge)
-                first[k], last[k] = 0.0, edge
-            for part in range(2):
-                low, high = (first, split) if part == 0 else (split, last)
-                _set_shares(height, place[2], apart, upright, disc, next_disc, low, high, share)
-                for k in range(len(out)):
-                    if part == 0:
-                        turn, closest = split[k], 2.0 * disc[k] / (height + disc[k])
-                    else:
-                        gap = max(apart - next_disc[k] + disc[k], disc[k])
-                        turn, closest = edge - split[k], min(2.0 * disc[k] / gap, 1.0)
-                    out[k] += share[k] * shear_ratio(turn, closest, table)
-        for k in range(len(out)):
-            first[k], split[k], last[k] = 0.0, min(max(along[k], 0.0), place[2]), place[2]
-        for part in range(2):
-            low, high = (first, split) if part == 0 else (split, last)
-            _add_film(place, one, two, low, high, out)
-
-
-@loops_inside
-def _set_shares(
-    height: float,
-    far: float,
-    apart: float,
-    upright: float,
-    disc: Array,
-    other: Array,
-    low: Array,
-    high: Array,
-    share: Array,
-) -> None:
-    """Sets the flux (n,) m4 on the rays of a disc between two angles from the normal of the wall.
-
-    A ray ends at the nearest line midway, or at the far side of the trapezoid.
-
-    Args:
-        height: m, of the disc above the wall.
-        far: m to the other disc, along the wall.
-        apart: m to the other disc.
-        upright: sine of the slope from the other up to it.
-        disc: (n,) m, its radii.
-        other: (n,) m, those of the other.
-        low: (n,) rad, the lower angle.
-        high: (n,) rad, the upper one.
-        share: the flux.
-    """
-    along = far / apart
-    for k in range(len(share)):
-        share[k] = 0.0
-    for p in range(len(POINTS)):
-        part, weight = 0.5 * (1.0 + POINTS[p]), 0.5 * WEIGHTS[p]
-        for k in range(len(share)):
-            width = max(high[k] - low[k], 0.0)
-            turn = low[k] + part * width - QUARTER
-            cosine, sine = -sine_of(turn), cosine_of(turn)
-            wider = other[k] - disc[k]
-            reach = min((height + disc[k]) / (1.0 + cosine), far / max(sine, TOLERANCE))
-            # the line midway to the other disc, at the angle between the ray and the two centres
-            below = apart * (upright * cosine + along * sine) + wider
-            reach = min(reach, midway(0.5 * (apart * apart - wider * wider), below))
-            share[k] += weight * width * flux_on_ray(reach, disc[k])
-
-
-@loops_inside
-def _add_film(place: Array, one: Array, two: Array, low: Array, high: Array, flux: Array) -> None:
-    """Adds the share of the wall, m4, between two distances (n,) m from the first foot."""
-    for p in range(len(FINE_POINTS)):
-        part, weight = 0.5 * (1.0 + FINE_POINTS[p]), 0.5 * FINE_WEIGHTS[p]
-        for k in range(len(flux)):
-            width = high[k] - low[k]
-            x = low[k] + part * width
-            below = (x**2 + place[0] ** 2 - one[k] ** 2) / (2.0 * (place[0] + one[k]))
-            rest = place[2] - x
-            beyond = (rest**2 + place[1] ** 2 - two[k] ** 2) / (2.0 * (place[1] + two[k]))
-            edge = place[0] + (place[1] - place[0]) * x / place[2]
-            flux[k] += weight * width * max(min(below, beyond, edge), 0.0) ** 3 / 3.0
-
-
-# ------------------------------------------------------------------------------------------------
-# Flow along the axis through a section of a throat on an edge of the box, between two side walls.
-#
-# The facet of the throat has a grain and its mirror images across both walls as corners. Its plane
-# is normal to both walls. Two such triangles make the rectangle between the grain and its three
-# images, and a quarter of that lies inside the box: the rectangle between the centre of the disc,
-# of radius rho, its feet on the walls, H_1 and H_2 away, and the edge of the box.
-#
-# Disc and walls share the fluid as at one wall. The line midway between the rim and a
-# wall is a parabola, that between the two walls halves their angle, and all three lines meet at
-# the distance d from both walls,
-#
-#     d = b - sqrt(b^2 - H_1^2 - H_2^2 + rho^2),  b = H_1 + H_2 + rho.
-#
-# There is no constant. Against finite differences the flux is within 5 % for H_2 / H_1 from 1 to 2
-# and rho / H_1 from 0.2 to 1.
-
-
-@loops_in_place
-def edge_fluxes(
-    rows: Array, sections: Sections, cuts: WallCuts, table: Array, lanes: Array, flux: Array
-) -> None:
-    """Writes the `flux` (S, n) m4 of the sides `rows` between two walls and a disc.
-
-    The arguments are those of `wall_fluxes`.
-    """
-    for s in rows:
-        t = sections.throat[s]
-        disc, place, out = sections.disc[s, cuts.order[t, 0]], cuts.place[t], flux[s]
-        near, turn, share = lanes[0], lanes[1], lanes[2]
-        for k in range(len(out)):
-            b = place[0] + place[1] + disc[k]
-            rest = place[0] ** 2 + place[1] ** 2 - disc[k] ** 2
-            near[k] = b - np.sqrt(max(b * b - rest, 0.0))
-            out[k] = 0.0
-        for i in range(2):
-            height, along = place[i], place[1 - i]
-            for k in range(len(out)):
-                turn[k] = angle_of(max(along - near[k], 0.0), height - near[k])
-                share[k] = 0.0
-            # on the rays of the disc up to `turn` from the normal of the wall
-            for p in range(len(FINE_POINTS)):
-                part, weight = 0.5 * (1.0 + FINE_POINTS[p]), 0.5 * FINE_WEIGHTS[p]
-                for k in range(len(out)):
-                    angle = part * turn[k] - QUARTER
-                    cosine, sine = -sine_of(angle), cosine_of(angle)
-                    reach = min((height + disc[k]) / (1.0 + cosine), along / max(sine, TOLERANCE))
-                    share[k] += weight * turn[k] * flux_on_ray(reach, disc[k])
-            for k in range(len(out)):
-                closest = min(2.0 * disc[k] / (height + disc[k]), 1.0)
-                out[k] += share[k] * shear_ratio(turn[k], closest, table)
-            # in the film on the wall, from the foot of the disc to the edge of the box
-            for p in range(len(FINE_POINTS)):
-                x = 0.5 * along * (1.0 + FINE_POINTS[p])
-                weight = 0.5 * along * FINE_WEIGHTS[p]
-                for k in range(len(out)):
-                    line = x * x + height * height - disc[k] * disc[k]
-                    film = min(line / (2.0 * (height + disc[k])), along - x, height)
-                    out[k] += weight * max(film, 0.0) ** 3 / 3.0
+    count = len(shapes.corners)
+    if around is None:
+        around = SpheresBeside(first=np.zeros(count + 1, int), place=np.zeros((0, 5)))
+    room = ray_room(int(np.diff(around.first).max(initial=0)))
+    flux, left = np.empty((2, len(sections.throat), sections.many))
+    given = (sections, shapes, around.first, around.place, kind, ratio_table(), room)
+    _set_fluxes(*given, flux, left)
+    return flux, left

@@ -2,7 +2,7 @@
 
 The sections of a throat are those of `lubrication`, with discs of the three grains. Every fine
 that reaches into the throat shows a disc in the sections that it meets. Together they leave the
-share s of the flux through the section, summed over rays (`share_around`). The section then
+share s of the flux through the section, summed over rays (`flux_among`). The section then
 carries s^m of its clean flux.
 
 With m = 1 the fluid would go straight through the gaps between the fines. But the gaps of one
@@ -21,27 +21,26 @@ from fdnet.network import geometry
 from fdnet.network.compiled import loops_in_place
 from fdnet.network.fines.deposit import images_near, points_in_boxes, size_classes
 from fdnet.network.fines.occupancy import Occupancy, ratio
-from fdnet.network.laws.cross_section import Sections, inwards, set_sides, wall_cuts
+from fdnet.network.laws.cross_section import (
+    EVERYWHERE,
+    Shapes,
+    inwards,
+    section_fluxes,
+    set_sides,
+    shapes_of,
+)
 from fdnet.network.laws.damage import BLOCKED, CLEAN, SECTIONS, Damage
 from fdnet.network.laws.lubrication import (
     STEPS,
     THROATS,
-    Prepared,
-    clear_fluxes,
-    cut_by_faces,
-    prepared,
     sections_of,
     spans_of,
 )
 from fdnet.network.laws.reaching_grains import (
-    RayRoom,
     SpheresBeside,
     facet_axes,
-    meet,
-    ray_room,
-    share_around,
 )
-from fdnet.network.laws.wedges import WIDENING, ratio_table, resistance_of
+from fdnet.network.laws.wedges import WIDENING, resistance_of
 from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line, unmoved
@@ -91,7 +90,7 @@ class ThroatPart(NamedTuple):
 
     throats: slice
     """Their place among all throats."""
-    given: Prepared
+    shapes: Shapes
     """Of their sections."""
     heights: Array
     """(K, 2) m of the nodes above the facets."""
@@ -109,7 +108,7 @@ class ThroatPart(NamedTuple):
 
 def parts_of(network: Network) -> Iterator[ThroatPart]:
     """All throats of a network, part by part."""
-    walls, nodes = wall_cuts(network), nodes_of(network).heights
+    nodes = nodes_of(network).heights
     for part in geometry.slices(len(network.throat_pores), THROATS):
         facet = network.image_position[network.throat_images[part]]
         axes = facet_axes(network, np.arange(part.start, part.stop), facet)
@@ -118,7 +117,7 @@ def parts_of(network: Network) -> Iterator[ThroatPart]:
         corners = (facet[:, None] + above).reshape(len(facet), 6, 3)
         yield ThroatPart(
             throats=part,
-            given=prepared(network, part, walls),
+            shapes=shapes_of(network, part),
             heights=nodes[part],
             origin=facet[:, 0].copy(),
             axes=axes,
@@ -181,25 +180,26 @@ class FineImages:
                 place[:, k] = geometry.dot(away, axis[throat])
             place[:, 3] = radius[image]
             real = np.zeros(len(throat), bool)
-            _set_reaching(part.given.base, part.ends, throat, place, np.empty((3, 3)), real)
+            _set_reaching(part.shapes, part.ends, throat, place, np.empty((4, 3)), real)
             yield throat[real], place[real]
 
 
 @loops_in_place
 def _set_reaching(
-    base: Array, ends: Array, throat: Array, place: Array, side: Array, real: Array
+    shapes: Shapes, ends: Array, throat: Array, place: Array, side: Array, real: Array
 ) -> None:
-    """Sets whether spheres (N) reach between the ends and the lines of the triangle of a prism.
+    """Sets whether spheres (N) reach between the ends and the lines of the polygon of a prism.
 
-    `side` (3, 3) is written to.
+    `side` (4, 3) is written to.
     """
     for n in range(len(throat)):
         t, x, y, z, r = throat[n], place[n, 0], place[n, 1], place[n, 2], place[n, 3]
         real[n] = ends[t, 0] - r < z < ends[t, 1] + r
         if real[n]:
-            set_sides(base[t], side)
-            for i in range(3):
-                real[n] = real[n] and inwards(base[t], side, i, x, y) > -r
+            base = shapes.corner[t, : shapes.corners[t]]
+            set_sides(base, side)
+            for i in range(len(base)):
+                real[n] = real[n] and inwards(base, side, i, x, y) > -r
 
 
 # ------------------------------------------------------------------------------------------------
@@ -237,11 +237,13 @@ def fine_resistances(
             for few in geometry.slices(len(chosen), at_once):
                 throats = chosen[few]
                 spans = spans_of(part.heights[throats], floor)
-                sections = sections_of(part.given, throats, spans, count + 1)
-                resistances = _without_and_with(part.given, sections, beside)
+                sections = sections_of(throats, spans, count + 1)
+                flux, left = section_fluxes(part.shapes, sections, beside, EVERYWHERE)
+                own = part.shapes.part[sections.throat]
                 both[:, part.throats.start + throats] = 0.0
                 place = part.throats.start + sections.throat, sections.side
-                both[0][place], both[1][place] = resistances
+                for result, open_flux in zip(both, (flux, flux * left**EXPONENT), strict=True):
+                    result[place] = resistance_of(open_flux, own, sections.step, WIDENING)
     return both[0], both[1], coarse
 
 
@@ -258,45 +260,6 @@ def _steps(beside: SpheresBeside, heights: Array, step: float) -> tuple[Array, A
     longest = np.abs(heights[some]).max(axis=1)
     wanted = np.clip(longest / (step * smallest), LEAST_STEPS, 2 * MOST_STEPS)
     return some, 2 ** np.ceil(np.log2(wanted)).astype(int)
-
-
-def _without_and_with(
-    given: Prepared, sections: Sections, beside: SpheresBeside
-) -> tuple[Array, Array]:
-    """Resistances (S,) 1/m3 of sides of throats without and with the fines near them."""
-    flux = clear_fluxes(given, sections)
-    cut_by_faces(given, sections, flux)
-    own = given.walls.part[sections.throat]
-    without = resistance_of(flux, own, sections.step, WIDENING)
-    room = ray_room(int(np.diff(beside.first).max(initial=0)))
-    _leave_shares(sections, given.base, beside, EXPONENT, ratio_table(), room, flux)
-    return without, resistance_of(flux, own, sections.step, WIDENING)
-
-
-@loops_in_place
-def _leave_shares(
-    sections: Sections,
-    base: Array,
-    beside: SpheresBeside,
-    power: float,
-    table: Array,
-    room: RayRoom,
-    flux: Array,
-) -> None:
-    """Multiplies the `flux` (S, n) by the share that fines leave, to a power."""
-    before = -1
-    for s in range(len(flux)):
-        t = sections.throat[s]
-        fines = beside.place[beside.first[t] : beside.first[t + 1]]
-        if t != before:
-            before = t
-            set_sides(base[t], room.side)
-            for i in range(len(fines) + 3):
-                room.number[i] = -1
-        for k in range(flux.shape[1]):
-            z = (2.0 * sections.side[s] - 1.0) * (sections.low[s] + k * sections.step[s])
-            count = meet(sections.disc[s, :, k], base[t], z, fines, room)
-            flux[s, k] *= share_around(base[t], count, room, table) ** power
 
 
 # ------------------------------------------------------------------------------------------------

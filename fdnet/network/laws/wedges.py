@@ -1,9 +1,8 @@
-"""Flow in the wedges of a section: elementary functions, the table of a wedge, rays and tubes.
+"""Flow in the wedges of a section: a logarithm, the table of a wedge, and tubes.
 
-The elementary functions are for loops over many numbers at once. They have no branch and no call,
-so the processor takes several numbers together. They agree with those of the C library to a few
-units of the last digit. Sources: Abramowitz and Stegun 1964, 4.1.27 (logarithm by the inverse
-hyperbolic tangent), 4.3.65 and 4.3.66 (sine and cosine), 4.4.42 (inverse tangent).
+The logarithm is for loops over many numbers at once. It has no branch and no call, so the
+processor takes several numbers together. It agrees with that of the C library to a few units of
+the last digit (Abramowitz and Stegun 1964, 4.1.27, by the inverse hyperbolic tangent).
 """
 
 import math
@@ -15,7 +14,6 @@ import numpy as np
 from fdnet.network.compiled import bits_of, loops_in_place, loops_inside, number_of
 from fdnet.spheres.snapshot import Array
 
-QUARTER = 0.5 * math.pi
 LN2 = math.log(2.0)
 EXPONENT = np.uint64(52)
 """Place of the exponent in the bits of a number."""
@@ -26,12 +24,6 @@ ONE = np.uint64(1023 << 52)
 WHOLE = np.uint64(0x433 << 52)
 """Bits of 2^52; a small whole number in its last bits is added to it."""
 OFFSET = 2.0**52 + 1023.0
-STEEP = math.sqrt(2.0) - 1.0
-"""Tangent of a sixteenth of a turn."""
-SINE = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(11))
-COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(12))
-ARC = tuple((-1.0) ** k / (2 * k + 1) for k in range(20))
-"""Coefficients of the series of sine, cosine and inverse tangent."""
 
 
 @loops_inside
@@ -53,54 +45,6 @@ def log_of(x: float) -> float:
         + w * w * w * w * (1.0 / 19.0)
     )
     return (number_of(power | WHOLE) - OFFSET) * LN2 + (2.0 * s + 2.0 * s * z * series)
-
-
-@loops_inside
-def sine_of(x: float) -> float:
-    """Sine of an angle between -pi / 2 and pi / 2."""
-    z = x * x
-    w = z * z
-    low = (SINE[0] + z * SINE[1]) + w * (SINE[2] + z * SINE[3])
-    middle = (SINE[4] + z * SINE[5]) + w * (SINE[6] + z * SINE[7])
-    high = (SINE[8] + z * SINE[9]) + w * SINE[10]
-    return x * (low + w * w * (middle + w * w * high))
-
-
-@loops_inside
-def cosine_of(x: float) -> float:
-    """Cosine of an angle between -pi / 2 and pi / 2."""
-    z = x * x
-    w = z * z
-    low = (COSINE[0] + z * COSINE[1]) + w * (COSINE[2] + z * COSINE[3])
-    middle = (COSINE[4] + z * COSINE[5]) + w * (COSINE[6] + z * COSINE[7])
-    high = (COSINE[8] + z * COSINE[9]) + w * (COSINE[10] + z * COSINE[11])
-    return low + w * w * (middle + w * w * high)
-
-
-@loops_inside
-def angle_of(y: float, x: float) -> float:
-    """Angle between -pi and pi of the vector (x, y), as arctan2; the vector is not 0.
-
-    Below an eighth of a turn the series of the inverse tangent is taken at y / x or x / y, or,
-    above half of that, at the tangent of the angle to an eighth.
-    """
-    ax, ay = abs(x), abs(y)
-    short, long = min(ax, ay), max(ax, ay)
-    steep = short > STEEP * long
-    s = (short - long if steep else short) / (short + long if steep else long)
-    z = s * s
-    w = z * z
-    v = w * w
-    low = (ARC[0] + z * ARC[1]) + w * (ARC[2] + z * ARC[3])
-    second = (ARC[4] + z * ARC[5]) + w * (ARC[6] + z * ARC[7])
-    third = (ARC[8] + z * ARC[9]) + w * (ARC[10] + z * ARC[11])
-    fourth = (ARC[12] + z * ARC[13]) + w * (ARC[14] + z * ARC[15])
-    last = (ARC[16] + z * ARC[17]) + w * (ARC[18] + z * ARC[19])
-    angle = s * (low + v * (second + v * (third + v * (fourth + v * last))))
-    angle = angle + 0.5 * QUARTER if steep else angle
-    angle = QUARTER - angle if ay > ax else angle
-    angle = 2.0 * QUARTER - angle if x < 0.0 else angle
-    return -angle if y < 0.0 else angle
 
 
 # ------------------------------------------------------------------------------------------------
@@ -143,40 +87,6 @@ def shear_ratio(angle: float, disc: float, table: Array) -> float:
 def ratio_table() -> Array:
     """Exact flux over that on rays at ANGLES (rows) and DISCS (columns)."""
     return np.loadtxt(TABLE, delimiter=",")
-
-
-# ------------------------------------------------------------------------------------------------
-# The flow on one ray from the centre of a disc, and where a ray ends.
-#
-# Shear between neighbouring rays is neglected; on each ray the flow is that in the annulus of
-# Happel (1959) whose free surface is where the ray ends. The functions have no branch, for loops
-# over many rays (`elementary`).
-
-
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
-FINE_POINTS, FINE_WEIGHTS = np.polynomial.legendre.leggauss(12)
-
-
-@loops_inside
-def flux_on_ray(reach: float, disc: float) -> float:
-    """Flux m4 per angle on a ray from the rim of a disc to the distance `reach` m from its centre.
-
-    `disc` m is the radius of the disc. The flux is 0 on a ray that does not leave it.
-    """
-    d2, r2 = reach * reach, disc * disc
-    flux = (4.0 * d2 * d2 * log_of(reach / disc) - 3.0 * d2 * d2 + 4.0 * d2 * r2 - r2 * r2) / 16.0
-    return flux if reach > disc else 0.0
-
-
-@loops_inside
-def midway(half: float, below: float) -> float:
-    """Distance m from the centre of a disc to the line midway between its rim and that of another.
-
-    With the distance a of the centres and the excess e of the radius of the other disc, `half` m2
-    is (a^2 - e^2) / 2, and `below` m is a cos(t) + e on the ray at the angle t from the line
-    between the centres. Infinite where the ray never meets the line.
-    """
-    return max(half / below, 0.0) if below > 0.0 else np.inf
 
 
 # ------------------------------------------------------------------------------------------------

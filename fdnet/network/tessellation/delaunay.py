@@ -37,8 +37,8 @@ class PlacedGrains:
 
     Attributes:
         grains: the n grains, their positions and radii as they are tessellated.
-        height: (n,) m, how far what stands for each grain reaches from its centre along x: less
-            than the radius for the flat cap of a grain centred beyond an x face.
+        own_radius: (n,) m, that of a grain centred beyond an x face, for which a half sphere
+            stands; of all others the radius as it is tessellated.
         outward: (n,) m, how far beyond an x face such a grain is centred; 0 for all others.
         index: (n,) which of the given grains they are.
         periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
@@ -50,7 +50,7 @@ class PlacedGrains:
     """
 
     grains: Snapshot
-    height: Array
+    own_radius: Array
     outward: Array
     index: Array
     periodic: tuple[bool, bool, bool]
@@ -90,19 +90,13 @@ def place_grains(grains: Snapshot, *, periodic: tuple[bool, bool, bool]) -> Plac
             "tetrahedron needs at least 4, give more grains, repeat a periodic cell, or mend the "
             "box"
         )
-    # A grain centred beyond an x face, but beyond no side wall, shows the box a flat cap of height
-    # h on a disc of radius a. The half ellipsoid on that disc with the volume of the cap has the
-    # height h (3 a^2 + h^2) / (4 a^2).
     given = grains.where(index)
     out, scale = _beyond(given), float(given.radius.mean())
     past = (out > ON_FACE_TOLERANCE * scale) & ~np.array(periodic)
     outward = np.where(past[:, 0] & ~past[:, 1:].any(axis=1), out[:, 0], 0.0)
-    tall = given.radius - outward
-    base = tall * (2.0 * given.radius - tall)
-    cap = tall * (3.0 * base + tall**2) / (4.0 * base)
     return PlacedGrains(
         grains=placed,
-        height=np.where(outward > 0.0, cap, placed.radius),
+        own_radius=np.where(outward > 0.0, given.radius, placed.radius),
         outward=outward,
         index=index,
         periodic=periodic,
