@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, set_keys
-from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 
 TINY: dict[str, Any] = {
     "name": "tiny",
@@ -39,17 +40,8 @@ def resting_spheres(
     position: list[list[float]], radius: float, box: Array, *, kind: Kind, first: int = 1
 ) -> Snapshot:
     """Equal spheres at `position` (N, 3) m, at rest, numbered from `first`; `box` (3, 2) m."""
-    count = len(position)
-    return Snapshot(
-        step=0,
-        time_s=0.0,
-        box=box,
-        id=np.arange(first, first + count),
-        kind=np.full(count, kind),
-        position=np.array(position),
-        radius=np.full(count, radius),
-        velocity=np.zeros((count, 3)),
-    )
+    made = resting(np.array(position), radius, box, kind)
+    return replace(made, id=made.id + (first - 1))
 
 
 def followed(*more, way="fluid.velocity_m_s=5.0"):

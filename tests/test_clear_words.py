@@ -1,5 +1,7 @@
 """Damaged inputs, strange surroundings and impossible values end with one clear line."""
 
+import json
+import math
 import os
 import subprocess
 import sys
@@ -10,10 +12,16 @@ import numpy as np
 import pytest
 from builders import tiny
 
-from fdnet.errors import DumpError, LiggghtsError, NetworkError
+from fdnet.cli import main
+from fdnet.errors import CaseError, DumpError, LiggghtsError, NetworkError
 from fdnet.network.permeability import analyse
-from fdnet.spheres.snapshot import Snapshot
-from tests.run.test_foreign_folders import CUBE, answer
+from fdnet.spheres.snapshot import Kind, Snapshot
+from tests.network.packs import snapshot
+
+BOX = ("--box", "0,3,0,3,0,3")
+CUBE = np.indices((3, 3, 3)).reshape(3, -1).T + 0.5
+"""Centres of touching grains of radius 0.5 that fill the box."""
+BOUNDS = np.array([[0.0, 3.0]] * 3)
 
 
 @pytest.fixture
@@ -24,12 +32,38 @@ def case(tmp_path: Path) -> Path:
     return path
 
 
-def refusal(capsys, *arguments: object) -> str:
-    """The one line with which a command that must end with 2 ends."""
-    code, err = answer(capsys, *arguments)
-    assert code == 2, err
+def answer(capsys, *arguments: object) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of one command."""
+    try:
+        code = main([str(argument) for argument in arguments])
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    return code, *capsys.readouterr()
+
+
+def refusal(capsys, *arguments: object, code: int = 2) -> str:
+    """The one line with which a command that must end with this code ends."""
+    ended, out, err = answer(capsys, *arguments)
+    assert (ended, out) == (code, ""), err
     assert len(err.strip().splitlines()) == 1, err
     return err
+
+
+def write_table(path: Path, **swap: str) -> Path:
+    """The cube as a table; `swap` replaces cells of the third sphere."""
+    columns = ["x_m", "y_m", "z_m", "radius_m"]
+    rows = [dict(zip(columns, map(str, [*place, 0.5]), strict=True)) for place in CUBE]
+    rows[2] |= swap
+    columns = list(rows[2])
+    lines = [",".join(row.get(name, "1") for name in columns) for row in rows]
+    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
+    return path
+
+
+def frame(step: str, row: str) -> str:
+    """A dump of one sphere."""
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n"
+    return head + "0 1\n" * 3 + f"ITEM: ATOMS id type x y z radius\n{row}\n"
 
 
 def test_the_depth_and_length_of_a_case_have_bounds(tmp_path, case, capsys):
@@ -56,25 +90,52 @@ def test_a_second_line_of_an_assignment_is_not_dropped(tmp_path, case, capsys):
 
 
 def test_long_numbers_in_files_of_spheres_are_refused(tmp_path, capsys):
-    number = "9" * 5000
-    table = tmp_path / "s.csv"
-    table.write_text(
-        CUBE.replace("radius_m\n", "radius_m,id\n").replace(",0.5\n", f",0.5,{number}\n")
-    )
+    number, dump = "9" * 5000, tmp_path / "s.dump"
+    table = write_table(tmp_path / "s.csv", id=number)
     assert "id is" in refusal(capsys, "permeability", table)
-    table.write_text(CUBE)
+    write_table(table)
     refusal(capsys, "permeability", table, "--sections", number)
     refusal(capsys, "permeability", table, "--types", f"{number}=grain")
-    dump = tmp_path / "s.dump"
-    head = (
-        "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n1\nITEM: BOX BOUNDS ff ff ff\n" + "0 1\n" * 3
-    )
-    dump.write_text(head.format(number) + "ITEM: ATOMS id type x y z radius\n1 1 0 0 0 1\n")
-    code, err = answer(capsys, "permeability", dump)
-    assert code == 2
-    assert "step is" in err
-    dump.write_text(head.format(0) + "ITEM: ATOMS id type x y z radius\n1 1e300 0 0 0 1\n")
-    assert "too large" in refusal(capsys, "permeability", dump)
+    for step, kind, words in ((number, "1", "step is"), ("0", "1e300", "too large")):
+        dump.write_text(frame(step, f"1 {kind} 0 0 0 1"))
+        assert words in refusal(capsys, "permeability", dump)
+
+
+def test_radii_beyond_reason_are_refused(tmp_path, capsys):
+    """Their cubes are no doubles: overflow where it was not refused."""
+    for radius in ("1e308", "1e-200", "1e100"):
+        table = write_table(tmp_path / "s.csv", radius_m=radius)
+        assert "check the units" in refusal(capsys, "permeability", table, *BOX, code=4)
+
+
+def test_a_stray_sphere_is_left_out_unless_a_period_would_have_to_bring_it_back(tmp_path, capsys):
+    """1e25 periods away no digit of its place is left; next to a wall it is counted as outside."""
+    for place, periodic, code in (("1e308", "", 4), ("1e25", "x", 4), ("1e25", "", 0)):
+        words = ["permeability", write_table(tmp_path / "s.csv", x_m=place), *BOX, "--json"]
+        ended, out, err = answer(capsys, *words, "--periodic", periodic)
+        assert ended == code, err
+        assert code or "1 grains lie outside the box" in " ".join(json.loads(out)["warnings"])
+
+
+def test_a_pack_whose_paths_are_all_closed_is_an_answer_at_the_command_line(tmp_path, capsys):
+    """A radius of 0.72 spacings closes every triangle of a cubic lattice (0.707): k = 0."""
+    table = write_table(tmp_path / "s.csv")
+    table.write_text(table.read_text().replace(",0.5\n", ",0.72\n"))
+    words = ["permeability", table, *BOX, "--periodic", "xyz", "--json"]
+    code, out, _ = answer(capsys, *words)
+    result = json.loads(out)
+    assert (code, result["k_initial_m2"], result["k_damaged_m2"]) == (0, 0, 0)
+    assert result["k_reduction"] is None
+    assert any("k_initial = 0: no open path" in one for one in result["warnings"])
+
+
+def test_a_snapshot_holds_no_number_that_is_none():
+    for name in ("position", "radius", "box"):
+        for value in (math.nan, math.inf, -math.inf):
+            fields = {"position": CUBE.copy(), "radius": np.full(27, 0.5), "box": BOUNDS.copy()}
+            fields[name].flat[1] = value
+            with pytest.raises(CaseError, match=f"{name} holds values that are not finite"):
+                snapshot(**fields)
 
 
 def test_a_dump_of_a_run_with_a_sphere_of_no_kind_or_size_is_named():
@@ -140,13 +201,10 @@ def test_a_terminal_that_knows_ascii_alone_and_names_that_are_no_utf_8(tmp_path,
     assert b"k\\xf6rner/pack/in.pack" in done.stdout
 
 
-def pack(fine: list[float] | None = None, radius: float = 0.1, *, side: float = 3.0) -> Snapshot:
-    """The cubic lattice of 27 touching grains of radius 0.5 in a box, with one fine."""
-    places = (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5).tolist()
-    radii, kinds = [0.5] * 27, ["grain"] * 27
-    if fine is not None:
-        places, radii, kinds = [*places, fine], [*radii, radius], [*kinds, "fine"]
-    return Snapshot.from_arrays(places, radii, kind=kinds, box=[0, side] * 3)
+def pack(*fine: float, radius: float = 0.1) -> Snapshot:
+    """The cube of grains and one fine."""
+    grains = snapshot(CUBE, 0.5, BOUNDS)
+    return grains.joined(snapshot([fine], radius, BOUNDS, Kind.FINE))
 
 
 def test_a_fine_larger_than_any_grain_or_wider_than_the_box_is_refused():
@@ -154,15 +212,15 @@ def test_a_fine_larger_than_any_grain_or_wider_than_the_box_is_refused():
         (60.0, "more than half the shortest side of the box"),
         (0.6, "the smallest grain one of 0.5 m"),
     ):
-        with pytest.raises(NetworkError, match=rf"id 28 has a radius of {radius:g} m, {limit}"):
-            analyse(pack([1.0, 1.0, 1.0], radius))
+        with pytest.raises(NetworkError, match=rf"id 1 has a radius of {radius:g} m, {limit}"):
+            analyse(pack(1.0, 1.0, 1.0, radius=radius))
 
 
 def test_fines_beyond_the_side_walls_are_counted():
-    outside = analyse(pack([1.0, 3.4, 1.0]))
+    outside = analyse(pack(1.0, 3.4, 1.0))
     assert any("1 fines are centred beyond the side walls" in text for text in outside.warnings)
-    assert not any("side walls" in text for text in analyse(pack([1.0, 1.0, 1.0])).warnings)
-    around = analyse(pack([1.0, 3.4, 1.0]), periodic="yz")
+    assert not any("side walls" in text for text in analyse(pack(1.0, 1.0, 1.0)).warnings)
+    around = analyse(pack(1.0, 3.4, 1.0), periodic="yz")
     assert not any("side walls" in text for text in around.warnings)
 
 

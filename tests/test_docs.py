@@ -223,6 +223,14 @@ def test_the_citation_has_the_version_of_the_package():
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
 
 
+def test_the_stability_table_names_tests_that_exist():
+    table = (ROOT / "docs/validation/stability.csv").read_text("utf-8")
+    nodes = re.findall(r"(tests/\S+\.py)::(\w+)", table)
+    assert len(nodes) > 50
+    bad = [one for one in nodes if f"def {one[1]}(" not in (ROOT / one[0]).read_text("utf-8")]
+    assert not bad
+
+
 def explained(heading: str, *, block: int = 0) -> list[str]:
     """Names that head the rows of a table or list of the pages on a run folder."""
     text = "\n## ".join(page.read_text() for page in RUN_PAGES)

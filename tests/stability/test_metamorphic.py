@@ -12,7 +12,7 @@ import pytest
 from builders import naming
 
 from fdnet.cli import main
-from fdnet.spheres.snapshot import Array, Kind, Snapshot
+from fdnet.spheres.snapshot import Array, Kind
 from tests.network.packs import random_pack, with_fines
 
 NIGHTLY = pytest.mark.nightly
@@ -27,17 +27,7 @@ and the spheres around a throat are sought about the centroid of its triangle.""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pack:
-    """Spheres as a file describes them.
-
-    Attributes:
-        place: (N, 3) centres.
-        radius: (N,) radii.
-        kind: (N,) Kind of each sphere.
-        box: (3, 2) lower and upper bounds.
-        periodic: names of the periodic directions.
-        axis: flow direction.
-        unit: unit of length.
-    """
+    """Spheres as a file describes them: centres, radii, kinds, bounds (3, 2), and the words."""
 
     place: Array
     radius: Array
@@ -46,16 +36,6 @@ class Pack:
     periodic: str
     axis: str = "x"
     unit: str = "m"
-
-
-def pack_of(spheres: Snapshot, periodic: str) -> Pack:
-    return Pack(
-        place=spheres.position,
-        radius=spheres.radius,
-        kind=spheres.kind,
-        box=np.array(spheres.box),
-        periodic=periodic,
-    )
 
 
 def permuted(pack: Pack) -> Pack:
@@ -137,8 +117,11 @@ def permeability(pack: Pack, folder: Path, capsys, *options: str) -> tuple[float
     return result["k_initial_m2"], result["k_damaged_m2"]
 
 
-def spheres(spread: float) -> Snapshot:
-    return with_fines(random_pack(40, 0.55, spread=spread), 120, 0.12)
+def spheres(spread: float, periodic: str) -> Pack:
+    both = with_fines(random_pack(40, 0.55, spread=spread), 120, 0.12)
+    return Pack(
+        place=both.position, radius=both.radius, kind=both.kind, box=both.box, periodic=periodic
+    )
 
 
 @pytest.mark.parametrize("periodic", [pytest.param("xyz", marks=NIGHTLY), "yz", ""])
@@ -146,7 +129,7 @@ def test_another_description_of_the_same_pack_gives_its_permeability(tmp_path, c
     """Radii of a wide range in all ways; equal ones, where prisms are cospherical, in two."""
     few = [(0.0, ("permuted", "mirrored in x"))] if periodic == "yz" else []
     for spread, names in [(0.3, tuple(CHANGES)), *few]:
-        pack = pack_of(spheres(spread), periodic)
+        pack = spheres(spread, periodic)
         for damage_law, rounding in (("thesis", ROUNDING), ("auto", RAYS[periodic])):
             law = ("--damage-law", damage_law)
             intact, damaged = permeability(pack, tmp_path, capsys, *law)
@@ -162,7 +145,7 @@ def test_another_description_of_the_same_pack_gives_its_permeability(tmp_path, c
 
 def test_without_tables_the_mirror_image_agrees_to_rounding(tmp_path, capsys):
     """The law of the thesis has closed forms only."""
-    pack = pack_of(spheres(0.3), "yz")
+    pack = spheres(0.3, "yz")
     values = [
         permeability(one, tmp_path, capsys, "--law", "thesis")[0]
         for one in (pack, mirrored(0)(pack), mirrored(1)(pack))
