@@ -180,10 +180,7 @@ def write_lines_vtp(path: str | Path, lines: Sequence[tuple[Array, Array]]) -> P
     return _save(path, mesh)
 
 
-# ------------------------------------------------------------------------------------------------
-# The ParaView files of a run as pyvista meshes, ready to plot.
-
-
+# ---- The ParaView files of a run as pyvista meshes, ready to plot.
 def read_mesh(path: Path) -> Any:
     """The mesh in a .vtp file, m. Raises CaseError when it is missing, unreadable or empty."""
     refuse_without_view(str(path))
