@@ -89,14 +89,9 @@ def open_runs(runs: str | Path | Sequence[str | Path], *, ranked_by: str = RANKE
     """Finished runs as one object, with means and 95 % bands by quantity and by depth.
 
     Nothing is run or written. `runs` is the folder of an ensemble or a sweep, a folder that holds
-    run folders, or a list of run folders.
-
-    Returns:
-        What `ensemble` returns: `table`, `mean`, `band`, `by_depth()`, `plot()`; lengths in m, k
-        in m2.
-
-    Raises:
-        CaseError: there is no finished run, or `ranked_by` is no quantity of its summary.
+    run folders, or a list of run folders. The object is that of `ensemble`: `table`, `mean`,
+    `band`, `by_depth()`, `plot()`; lengths in m, k in m2. Raises CaseError where there is no
+    finished run, or `ranked_by` is no quantity of its summary.
 
     Examples:
         >>> import fdnet
@@ -105,8 +100,6 @@ def open_runs(runs: str | Path | Sequence[str | Path], *, ranked_by: str = RANKE
         ['mean', 'low', 'high', 'seeds']
         >>> 0 < float(runs.mean["k_reduction"]) < 1
         True
-        >>> runs.by_depth().columns[:4].tolist()
-        ['variant', 'section', 'x_lo_m', 'x_hi_m']
     """
     if not isinstance(runs, str | Path):
         folders, out = [expanded(run) for run in runs], Path()

@@ -76,7 +76,9 @@ class Compared:
     @cached_property
     def table(self) -> "pd.DataFrame":
         """A row for each run with every number of its summary, lengths in m, k in m2."""
-        return results.run_table(self.comparison)
+        import pandas as pd
+
+        return pd.DataFrame(results.run_rows(self.comparison))
 
     @cached_property
     def band(self) -> "pd.DataFrame":

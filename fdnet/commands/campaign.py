@@ -143,7 +143,7 @@ def _run_ensemble(options: argparse.Namespace) -> int:
     from fdnet.campaign.plan import ensemble_plan
 
     if options.fast:
-        options.set.append('invasion.method="network"')
+        options.set = [*options.set, 'invasion.method="network"']
     plan = ensemble_plan(case_of(options), options.seeds, **_plan_options(options))
     return _run_campaign(options, plan)
 

@@ -41,10 +41,8 @@ def case_words(case: Case, scales: object = None) -> Iterator[str]:
     yield f"Sand: grains of {_size_words(case.grains)}, {packed}."
     if isinstance(case, InvasionCase):
         solids, viscosity = 100 * case.fines.volume_fraction, 1e3 * case.fluid.viscosity_Pa_s
-        yield (
-            f"Mud: fines of {_size_words(case.fines)}, {solids:.3g} % of solids by volume, in a "
-            f"liquid of {viscosity:.3g} cP."
-        )
+        liquid = f"in a liquid of {viscosity:.3g} cP"
+        yield f"Mud: fines of {_size_words(case.fines)}, {solids:.3g} % of solids by volume, {liquid}."
         yield _drive(case, scales)
     else:
         yield "No mud."
@@ -245,7 +243,9 @@ def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
 # ---- A run in lines of text, and the same in a notebook; the page shows the same facts.
 WIDTH = 96
 """Letters in a line of running text."""
-_HEAD = "depth mm,porosity,with fines,k mD,with fines,lost %,in place %,fines".split(",")
+_HEAD = (
+    "depth mm", "porosity", "with fines", "k mD", "with fines", "lost %", "in place %", "fines"
+)  # fmt: skip
 
 
 class Fact(NamedTuple):
