@@ -82,7 +82,8 @@ def compare_runs(
         Traceback (most recent call last):
         fdnet.errors.CaseError: no/such/run: does not exist; ...
     """
-    return write_comparison(gathered([expanded(run) for run in runs], expanded(out), ranked_by))
+    places = [expanded(run) for run in runs]
+    return write_comparison(gathered(places, expanded(out), ranked_by), {})
 
 
 def open_runs(runs: str | Path | Sequence[str | Path], *, ranked_by: str = RANKED_BY) -> Compared:
@@ -138,15 +139,14 @@ def _carried_out(
     plan = plan_of(limit=jobs_limit, ranks=ranks, stages=tuple(stages))
     jobs = max(1, cores() // ranks) if jobs is None else jobs
     running, folder = HowToRun(jobs=jobs, quiet=not progress, **how), expanded(out)
-    return write_comparison(carry_out(folder, plan, running, ranked_by))
+    return write_comparison(carry_out(folder, plan, running, ranked_by), {})
 
 
 # ---- From a plan to its comparison.
 def carry_out(
     path: Path, plan: Plan, how: HowToRun, ranked_by: str, *, run: bool = True
 ) -> Comparison:
-    """Run what is missing of the plan in the folder `path`, or with `run` false nothing; returns
-    the comparison. Raises the error of the first variant where none can be run."""
+    """Run what is missing of the plan in the folder `path`, or nothing; returns the comparison."""
     if run:
         _refuse_hopeless(path, plan, how)
     with plans.campaign_folder(path, plan) as (held, lock):

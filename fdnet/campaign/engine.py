@@ -195,9 +195,8 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Callable[...,
         _stop(running.values(), os.kill, signal.SIGTERM)
     if full and waiting:
         advice = "free space, then repeat the command, which runs only what is missing"
-        raise CaseError(
-            f"{path}: the disk is full; {len(waiting)} jobs were not started: {advice}"
-        )
+        problem = f"the disk is full; {len(waiting)} jobs were not started"
+        raise CaseError(f"{path}: {problem}: {advice}")
 
 
 # ---- Snakemake, with the static Snakefile that comes with fdnet.

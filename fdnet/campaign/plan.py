@@ -28,10 +28,8 @@ from fdnet.scales.clock import spoken_time
 from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
 
-MOST_JOBS = 1000
-"""Most runs of a plan that are accepted without a word of confirmation."""
-FAST = {"invasion.method": "network"}
-"""The keys of the fast model."""
+MOST_JOBS, FAST = 1000, {"invasion.method": "network"}
+"""Most runs of a plan that are accepted without a confirmation, and the key of the fast model."""
 
 
 # ---- The plan: which cases are run with which seeds, frozen before the first run.

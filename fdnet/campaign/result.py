@@ -332,9 +332,8 @@ def write_table(comparison: Comparison) -> None:
     """Write table.csv, the `run_rows` with numbers as they are."""
     import pandas as pd
 
-    text = pd.DataFrame(run_rows(comparison), dtype=object).to_csv(
-        index=False, lineterminator="\n"
-    )
+    table = pd.DataFrame(run_rows(comparison), dtype=object)
+    text = table.to_csv(index=False, lineterminator="\n")
     write_text(comparison.path / TABLE, text)
 
 

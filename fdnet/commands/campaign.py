@@ -75,7 +75,7 @@ def _finish(
     """
     from fdnet.campaign import page
 
-    made = page.write_comparison(comparison, limits)
+    made = page.write_comparison(comparison, limits or {})
     if options.json:
         print(json.dumps(made.summary, indent=1))
     else:

@@ -41,8 +41,8 @@ def case_words(case: Case, scales: object = None) -> Iterator[str]:
     yield f"Sand: grains of {_size_words(case.grains)}, {packed}."
     if isinstance(case, InvasionCase):
         solids, viscosity = 100 * case.fines.volume_fraction, 1e3 * case.fluid.viscosity_Pa_s
-        liquid = f"in a liquid of {viscosity:.3g} cP"
-        yield f"Mud: fines of {_size_words(case.fines)}, {solids:.3g} % of solids by volume, {liquid}."
+        mud = f"{solids:.3g} % of solids by volume, in a liquid of {viscosity:.3g} cP"
+        yield f"Mud: fines of {_size_words(case.fines)}, {mud}."
         yield _drive(case, scales)
     else:
         yield "No mud."
