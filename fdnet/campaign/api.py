@@ -82,21 +82,17 @@ def compare_runs(
         Traceback (most recent call last):
         fdnet.errors.CaseError: no/such/run: does not exist; ...
     """
-    return write_comparison(gathered([expanded(run) for run in runs], expanded(out), ranked_by))
+    places = [expanded(run) for run in runs]
+    return write_comparison(gathered(places, expanded(out), ranked_by), {})
 
 
 def open_runs(runs: str | Path | Sequence[str | Path], *, ranked_by: str = RANKED_BY) -> Compared:
     """Finished runs as one object, with means and 95 % bands by quantity and by depth.
 
     Nothing is run or written. `runs` is the folder of an ensemble or a sweep, a folder that holds
-    run folders, or a list of run folders.
-
-    Returns:
-        What `ensemble` returns: `table`, `mean`, `band`, `by_depth()`, `plot()`; lengths in m, k
-        in m2.
-
-    Raises:
-        CaseError: there is no finished run, or `ranked_by` is no quantity of its summary.
+    run folders, or a list of run folders. The object is that of `ensemble`: `table`, `mean`,
+    `band`, `by_depth()`, `plot()`; lengths in m, k in m2. Raises CaseError where there is no
+    finished run, or `ranked_by` is no quantity of its summary.
 
     Examples:
         >>> import fdnet
@@ -105,8 +101,6 @@ def open_runs(runs: str | Path | Sequence[str | Path], *, ranked_by: str = RANKE
         ['mean', 'low', 'high', 'seeds']
         >>> 0 < float(runs.mean["k_reduction"]) < 1
         True
-        >>> runs.by_depth().columns[:4].tolist()
-        ['variant', 'section', 'x_lo_m', 'x_hi_m']
     """
     if not isinstance(runs, str | Path):
         folders, out = [expanded(run) for run in runs], Path()
@@ -145,15 +139,14 @@ def _carried_out(
     plan = plan_of(limit=jobs_limit, ranks=ranks, stages=tuple(stages))
     jobs = max(1, cores() // ranks) if jobs is None else jobs
     running, folder = HowToRun(jobs=jobs, quiet=not progress, **how), expanded(out)
-    return write_comparison(carry_out(folder, plan, running, ranked_by))
+    return write_comparison(carry_out(folder, plan, running, ranked_by), {})
 
 
 # ---- From a plan to its comparison.
 def carry_out(
     path: Path, plan: Plan, how: HowToRun, ranked_by: str, *, run: bool = True
 ) -> Comparison:
-    """Run what is missing of the plan in the folder `path`, or with `run` false nothing; returns
-    the comparison. Raises the error of the first variant where none can be run."""
+    """Run what is missing of the plan in the folder `path`, or nothing; returns the comparison."""
     if run:
         _refuse_hopeless(path, plan, how)
     with plans.campaign_folder(path, plan) as (held, lock):

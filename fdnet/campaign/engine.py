@@ -77,16 +77,12 @@ class HowToRun:
 
 
 class Task(NamedTuple):
-    """One process of a campaign: its name, what it calls in the folder of the campaign, the file
-    that is there when it has succeeded, and the task that must have ended before."""
+    """One process: what it calls, the file that it makes, and the task that must end before."""
 
     name: str
     words: Sequence[str]
     makes: str
     after: str = ""
-
-
-Ended = Callable[[str, int], None]
 
 
 def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
@@ -114,10 +110,7 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
 
 
 def _tasks_of(path: Path, plan: Plan, how: HowToRun) -> list[Task]:
-    """Packs that several runs share, and runs that are not done.
-
-    A finished run whose files were changed is no task: it is named, and its files stay.
-    """
+    """Packs that several runs share, and runs that are not done; changed ones are only named."""
     shared, packs, runs = plan.packs, dict[str, Task](), []
     for job in plan.jobs:
         status, reason = state_of(path, plan, job)
@@ -171,11 +164,8 @@ def _stop(running: Iterable[subprocess.Popen], kill: Callable[..., None], number
 
 
 # ---- The pool: some processes at a time on this machine, nothing else needed.
-def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> None:
-    """Run the tasks, `jobs` at a time; an exception stops the running ones in good order.
-
-    One that fails stops only those that need what it makes.
-    """
+def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Callable[..., None]) -> None:
+    """Run the tasks, `jobs` at a time; one that fails stops only those that need what it makes."""
     waiting, running, full = list(tasks), dict[str, subprocess.Popen](), False
     failed: set[str] = set()
     # The kernel sends SIGTERM when the parent dies, however it dies (PR_SET_PDEATHSIG).
@@ -205,9 +195,8 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Ended) -> Non
         _stop(running.values(), os.kill, signal.SIGTERM)
     if full and waiting:
         advice = "free space, then repeat the command, which runs only what is missing"
-        raise CaseError(
-            f"{path}: the disk is full; {len(waiting)} jobs were not started: {advice}"
-        )
+        problem = f"the disk is full; {len(waiting)} jobs were not started"
+        raise CaseError(f"{path}: {problem}: {advice}")
 
 
 # ---- Snakemake, with the static Snakefile that comes with fdnet.
@@ -225,12 +214,12 @@ def has_snakemake() -> bool:
 
 
 def _run_snakemake(
-    path: Path, plan: Plan, tasks: Sequence[Task], how: HowToRun, lock: int, ended: Ended
+    path: Path, plan: Plan, tasks: Sequence[Task], how: HowToRun, lock: int, ended: Any
 ) -> None:
     """Run what is missing as jobs of Snakemake, which cancels them when it is stopped by SIGINT.
 
-    Snakemake inherits the lock of the folder and its name stands in it, so that no other call
-    works there while it lives, also when this process is killed.
+    It inherits the lock of the folder and its name stands in it, so that no other call works there
+    while it lives, also when this process is killed.
     """
     write_text(path / _CONFIG, json.dumps({"options": how.options}))
     words, log = _snakemake_words(how, plan), _log(path, "snakemake")

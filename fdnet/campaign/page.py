@@ -27,8 +27,7 @@ SHOWN = ["k_reduction", "damage.face_lost", "k_damaged_m2", "invasion_depth_p95_
 SHOWN += ["skin", "skin_flow_lost", "invaded_count", "passed_count"]
 """Quantities of the tables of the page, after the ranked one."""
 LAYERS = ["porosity_initial", "porosity_damaged", "k_initial_m2", "k_damaged_m2", "k_reduction"]
-LAYERS += ["fines_count"]
-"""Quantities of the tables by depth."""
+"""Quantities of the tables by depth, and the number of fines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,14 +75,14 @@ class Compared:
     @cached_property
     def table(self) -> "pd.DataFrame":
         """A row for each run with every number of its summary, lengths in m, k in m2."""
-        return results.run_table(self.comparison)
+        import pandas as pd
+
+        return pd.DataFrame(results.run_rows(self.comparison))
 
     @cached_property
     def band(self) -> "pd.DataFrame":
-        """`mean`, `low` and `high` of the 95 % band, and `seeds`: a row for each quantity.
-
-        Where there are several variants, the rows go by variant and quantity.
-        """
+        """`mean`, `low` and `high` of the 95 % band, and `seeds`: a row for each quantity, or of
+        several variants for each variant and quantity."""
         return results.band_table(self.comparison)
 
     @property
@@ -111,11 +110,9 @@ class Compared:
     __repr__ = __str__
 
 
-def write_comparison(
-    comparison: Comparison, limits: Mapping[str, float] | None = None
-) -> Compared:
+def write_comparison(comparison: Comparison, limits: Mapping[str, float]) -> Compared:
     """Write table.csv, summary.json, figures and compare.html; `limits` (SI) are of targets."""
-    made = Compared(comparison, limits or {})
+    made = Compared(comparison, limits)
     results.write_table(comparison)
     write_text(made.path / results.SUMMARY, json.dumps(made.summary, indent=1) + "\n")
     judged = [line for *_, line in made.candidates]
@@ -130,7 +127,7 @@ def write_comparison(
         figures=_draw(comparison),
         columns=_shown(comparison),
         slabs=sorted({int(one[1]) for one in map(results.SLAB.match, comparison.numbers) if one}),
-        layers=[one for one in html.SECTION_COLUMNS[3:] if one[0] in LAYERS],
+        layers=[one for one in html.SECTION_COLUMNS[3:] if one[0] in [*LAYERS, "fines_count"]],
         label=label,
         value_text=value_text,
         ends_text=ends_text,
@@ -255,13 +252,9 @@ def pair_lines(comparison: Comparison) -> list[str]:
 
 def failure_lines(comparison: Comparison) -> list[str]:
     """Each run that has no result, with its reason and folder."""
-    return [
-        *(
-            f"{one.name} {one.status}: {one.reason} (folder {one.folder})"
-            for one in comparison.failed
-        ),
-        *(f"{one}: has no result and is left out" for one in comparison.left_out),
-    ]
+    failed = comparison.failed
+    lines = [f"{one.name} {one.status}: {one.reason} (folder {one.folder})" for one in failed]
+    return [*lines, *(f"{one}: has no result and is left out" for one in comparison.left_out)]
 
 
 HEADS = {"met": "meets every target", "open": "may meet its targets", "missed": "misses a target"}
@@ -269,22 +262,20 @@ HEADS = {"met": "meets every target", "open": "may meet its targets", "missed": 
 
 
 def candidates(comparison: Comparison, limits: Mapping[str, float]) -> list[tuple[str, str, str]]:
-    """Name, worst state and reasons of each mud: all met first, then by the mean nearest to its
-    limit."""
+    """Name, state and reasons of each mud: all met first, then by the mean nearest its limit."""
     states, rows = list(HEADS), []
     for name in filter(comparison.of_variant, comparison.variants if limits else ()):
         reasons, worst, over = [], 0, -math.inf
         for target, limit in limits.items():
             quantity = results.GOALS[target][0]
-            values = [*comparison.values(name, quantity).values()]
-            band = comparison.band(name, quantity)
+            values, band = comparison.values(name, quantity), comparison.band(name, quantity)
             state = 0 if band.high <= limit else 2 if band.low > limit else 1
             worst = max(worst, state)
             over = max(over, band.mean / limit if limit else math.inf)
             reason = f"{label(quantity)} {band_text(quantity, band)}, at most "
             reason += f"{value_text(quantity, limit)}: {states[state]}"
             if state == 1 and len(values) > 1 and (gap := abs(band.mean - limit)) > 0:
-                needed = seeds_for_width(values, gap, MOST_SEEDS)
+                needed = seeds_for_width([*values.values()], gap, MOST_SEEDS)
                 reason += f", some {needed} seeds would decide it"
             reasons.append(reason)
         rows.append((worst, over, name, "; ".join(reasons)))
@@ -307,11 +298,8 @@ def _draw(comparison: Comparison) -> dict[str, dict[str, str]]:
         caption = "Every run (grey), mean over the seeds (line) and its 95 % band (blue)."
         add("ranking", _fill_ranking, caption)
     if "sections.1.k_damaged_inplace_m2" in comparison.numbers:
-        more = (
-            f", of {len(figures.PALETTE)} variants at most"
-            if several
-            else "; thin lines are the runs"
-        )
+        most = f", of {len(figures.PALETTE)} variants at most"
+        more = most if several else "; thin lines are the runs"
         caption = (
             "Permeability in place of the slabs after the invasion, mean over the seeds with its "
             f"95 % band; dashed is the intact sand{more}."

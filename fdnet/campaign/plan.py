@@ -28,10 +28,8 @@ from fdnet.scales.clock import spoken_time
 from fdnet.scales.cost import cost_of
 from fdnet.scales.scales import scales_of
 
-MOST_JOBS = 1000
-"""Most runs of a plan that are accepted without a word of confirmation."""
-FAST = {"invasion.method": "network"}
-"""The keys of the fast model."""
+MOST_JOBS, FAST = 1000, {"invasion.method": "network"}
+"""Most runs of a plan that are accepted without a confirmation, and the key of the fast model."""
 
 
 # ---- The plan: which cases are run with which seeds, frozen before the first run.
@@ -211,10 +209,8 @@ def label_of(keys: Mapping[str, Any]) -> str:
 def sweep_plan(
     path: str | Path, *, fast: bool = False, limit: int = MOST_JOBS, **more: Any
 ) -> Plan:
-    """Every combination of the sweep file at `path`, each a checked case.
-
-    The paths of cases are relative to the file. Raises CaseError for what is wrong in it, for
-    keys that a case does not take, and for more runs than `limit`.
+    """Every combination of the sweep file at `path`, each a checked case; the paths of cases are
+    relative to the file. Raises CaseError for what is wrong in it, and for more runs than `limit`.
     """
     place = expanded(path)
     try:
@@ -309,11 +305,9 @@ def refuse_foreign(path: Path, own: Collection[str], what: str) -> None:
 
 @contextlib.contextmanager
 def campaign_folder(path: Path, plan: Plan) -> Iterator[tuple[Plan, int]]:
-    """Hold the lock of the folder while the block runs; gives all its plan and the descriptor.
-
-    The same plan with further seeds extends the one that is kept. Raises CaseError, with nothing
-    changed, for a folder of another plan or of something else, and while another call works there.
-    """
+    """Hold the lock of the folder while the block runs; gives its plan, extended by further seeds,
+    and the descriptor. Raises CaseError, with nothing changed, for a folder of another plan or of
+    something else, and while another call works there."""
     if read_plan_record(path) is None:
         refuse_foreign(path, (LOCK, LOGS, CASES), "campaign")
     try:
@@ -368,10 +362,7 @@ class State(NamedTuple):
 
 
 def state_of(path: Path, plan: Plan, job: Job) -> State:
-    """How a run of the campaign in `path` stands.
-
-    It has failed also where one of its files was changed, cut or removed afterwards.
-    """
+    """How a run stands; it has failed also where a file was changed, cut or removed afterwards."""
     folder = path / RUNS / job.name
     if not (folder / MANIFEST).exists():
         names = (job.name, f"pack-{job.case.digest('pack')}")

@@ -178,13 +178,13 @@ class Comparison:
         return bool(both) and all(packs[0][seed] == packs[1][seed] != "" for seed in both)
 
 
-def refuse_unknown(comparison: Comparison, quantity: str, option: str) -> Comparison:
-    """The comparison. Raises CaseError when no finished run has this quantity."""
-    names = list(comparison.numbers)
+def _known(comparison: Comparison) -> Comparison:
+    """The comparison. Raises CaseError when no finished run has the quantity that it ranks by."""
+    names, quantity = list(comparison.numbers), comparison.ranked_by
     if names and quantity not in names:
         near = difflib.get_close_matches(quantity, names, n=3, cutoff=0.3) or [RANKED_BY]
         problem = f"{quantity!r} is no number of the summaries"
-        raise CaseError(f"{option}: {problem}; did you mean {', '.join(near)}?")
+        raise CaseError(f"--rank-by: {problem}; did you mean {', '.join(near)}?")
     return comparison
 
 
@@ -205,15 +205,11 @@ def gather_plan(path: Path, plan: Plan, *, ranked_by: str = RANKED_BY) -> Compar
     packs = [read_record(path / PACKS / digest, "pack") for digest in digests]
     shared = sum(processor_seconds(packs, {}).values())
     keys, runs_of = dict.fromkeys(key for v in plan.variants for key in v.keys), tuple(entries)
-    made = Comparison(plan.name, path, tuple(keys), runs_of, ranked_by, packs_s=shared)
-    return refuse_unknown(made, ranked_by, "--rank-by")
+    return _known(Comparison(plan.name, path, tuple(keys), runs_of, ranked_by, packs_s=shared))
 
 
 def gather_runs(runs: Sequence[Path], out: Path, *, ranked_by: str = RANKED_BY) -> Comparison:
-    """The comparison of finished run folders; a folder of a campaign stands for all its runs.
-
-    Raises CaseError for a folder without a finished run and for two runs of one case and seed.
-    """
+    """The comparison of finished run folders; a folder of a campaign stands for all its runs."""
     left_out: list[str] = []
     folders = [folder for run in runs for folder in _folders(run, left_out)]
     cases = [check_finished(folder)[1] for folder in folders]
@@ -231,8 +227,7 @@ def gather_runs(runs: Sequence[Path], out: Path, *, ranked_by: str = RANKED_BY) 
             what = f"is the same case and seed as {same.folder}, and would be counted twice"
             raise CaseError(f"{entry.folder}: {what}; leave one out")
     title, runs_of = f"{len(entries)} runs", tuple(entries.values())
-    made = Comparison(title, out, keys, runs_of, ranked_by, tuple(left_out))
-    return refuse_unknown(made, ranked_by, "--rank-by")
+    return _known(Comparison(title, out, keys, runs_of, ranked_by, tuple(left_out)))
 
 
 def _folders(run: Path, left_out: list[str]) -> Iterator[Path]:
@@ -289,7 +284,8 @@ def _variant_names(cases: Sequence[str], varied: Sequence[Mapping[str, Any]]) ->
 
 
 # ---- table.csv and summary.json.
-def _rows(comparison: Comparison) -> list[dict[str, Any]]:
+def run_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """A row for each run, with every number of its summary by dotted key, SI."""
     rows = []
     for one in comparison.entries:
         varied = dict.fromkeys(comparison.keys)
@@ -301,16 +297,8 @@ def _rows(comparison: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
-def run_table(comparison: Comparison) -> "pd.DataFrame":
-    """A row for each run, with every number of its summary by dotted key, SI."""
-    import pandas as pd
-
-    return pd.DataFrame(_rows(comparison))
-
-
 def band_table(comparison: Comparison) -> "pd.DataFrame":
-    """Mean, 95 % band (low, high) and number of seeds by quantity, SI; of several variants by
-    variant and quantity."""
+    """Mean, band and seeds by quantity, SI; of several variants by variant and quantity."""
     import pandas as pd
 
     rows = [
@@ -324,8 +312,7 @@ def band_table(comparison: Comparison) -> "pd.DataFrame":
 
 
 def depth_table(comparison: Comparison) -> "pd.DataFrame":
-    """A row for each variant and slab: edges (m), and of each number of the slab its mean over
-    the seeds, and its 95 % band as `_low` and `_high`."""
+    """A row for each variant and slab: edges (m), and means with bands as `_low` and `_high`."""
     import pandas as pd
 
     rows: dict[tuple[str, int], dict[str, Any]] = {}
@@ -342,17 +329,18 @@ def depth_table(comparison: Comparison) -> "pd.DataFrame":
 
 
 def write_table(comparison: Comparison) -> None:
-    """Write table.csv, `run_table` with numbers as they are."""
+    """Write table.csv, the `run_rows` with numbers as they are."""
     import pandas as pd
 
-    text = pd.DataFrame(_rows(comparison), dtype=object).to_csv(index=False, lineterminator="\n")
+    table = pd.DataFrame(run_rows(comparison), dtype=object)
+    text = table.to_csv(index=False, lineterminator="\n")
     write_text(comparison.path / TABLE, text)
 
 
 def summary_of(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
     """Means over seeds and variants, and of each variant, with `more` keys, as JSON knows them."""
     kept = ("run", "status", "reason", "folder")
-    lost = [row for row in _rows(comparison) if row["status"] != "done"]
+    lost = [row for row in run_rows(comparison) if row["status"] != "done"]
     failures = [{key: row[key] for key in kept} for row in lost]
     result: dict[str, Any] = {
         "title": comparison.title,

@@ -76,7 +76,7 @@ def _finish(
     """
     from fdnet.campaign import page
 
-    made = page.write_comparison(comparison, limits)
+    made = page.write_comparison(comparison, limits or {})
     if options.json:
         print(json.dumps(made.summary, indent=1))
     else:
@@ -148,7 +148,7 @@ def _run_ensemble(options: argparse.Namespace) -> int:
     from fdnet.campaign.plan import ensemble_plan
 
     if options.fast:
-        options.set.append('invasion.method="network"')
+        options.set = [*options.set, 'invasion.method="network"']
     plan = ensemble_plan(case_of(options), options.seeds, **_plan_options(options))
     return _run_campaign(options, plan)
 

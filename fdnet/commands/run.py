@@ -121,7 +121,7 @@ def _run(options: argparse.Namespace) -> int:
     from fdnet.run.records import RunOptions, cores
 
     if options.fast:
-        options.set.append('invasion.method="network"')
+        options.set = [*options.set, 'invasion.method="network"']
     case = case_of(options)
     if options.dry_run:
         _refuse_refused(_print_scales(case))

@@ -121,10 +121,7 @@ def plain_decades(axes: Any) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-# ------------------------------------------------------------------------------------------------
-# Where fines of each size lie: their volume against depth, in classes of size.
-
-
+# ---- Where fines of each size lie: their volume against depth, in classes of size.
 CLASSES, BINS = 3, 24
 COLOURS = ("#56B4E9", "#E69F00", "#D55E00")
 ONE_SIZE = 0.02
@@ -154,10 +151,7 @@ def fill_deposit(figure: Any, *, fines: Snapshot) -> None:
     legend_above(axes, columns=2)
 
 
-# ------------------------------------------------------------------------------------------------
-# The invasion against time: counts of fines, and rate and permeability where they are known.
-
-
+# ---- The invasion against time: counts of fines, and rate and permeability where they are known.
 def fill_history(figure: Any, *, history: Sequence[Mapping[str, float]]) -> None:
     counts = (
         ("invaded_count", "inside the specimen", BLUE, "-"),
@@ -242,10 +236,7 @@ def fill_network(figure: Any, *, analysis: "Analysis") -> None:
     figure.set_size_inches(9.0, min(14.0, max(5.0, height)))
 
 
-# ------------------------------------------------------------------------------------------------
-# The true cut through the specimen in the x-z plane of its middle.
-
-
+# ---- The true cut through the specimen in the x-z plane of its middle.
 GRAIN_FACE, GRAIN_EDGE = "#D9D9D9", "#8C8C8C"
 
 
@@ -318,10 +309,7 @@ def _side_frame(figure: Any, axes: Any, snapshot: Snapshot) -> None:
     figure.set_size_inches(9.0, min(9.0, max(3.0, 7.2 * height / width + 1.9)))
 
 
-# ------------------------------------------------------------------------------------------------
-# The curves of sizes: asked for, placed, and of the fines that invaded.
-
-
+# ---- The curves of sizes: asked for, placed, and of the fines that invaded.
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlacedSizes:
     """Grains or fines of measured sizes: the law and the curve of the case, and diameters, m.
@@ -371,10 +359,7 @@ def _size_steps(axes: Any, diameter: Array, curve: SizeCurve, **style: Any) -> N
     axes.step(MICRON * rising[seen], 100 * finer[seen], where="post", linewidth=1.3, **style)
 
 
-# ------------------------------------------------------------------------------------------------
-# All figures of one specimen, and those against depth.
-
-
+# ---- All figures of one specimen, and those against depth.
 CAPTIONS = {
     "spheres_3d": "The specimen from the front and upstream: the grains of the far half (grey) "
     "and the fines, coloured by radius, or by depth where they are of one size. The fluid enters "
@@ -504,10 +489,7 @@ def _size_distributions(figure: Any, *, analysis: "Analysis", fines: Snapshot | 
         legend_above(axes, columns=1)
 
 
-# ------------------------------------------------------------------------------------------------
-# A result that only some runs have: its table, its figure, its part of the summary and page.
-
-
+# ---- A result that only some runs have: its table, its figure, its part of the summary and page.
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PageTable:
     """A table of the page report.html: heading, columns, rows (SI) and what a reader must know.
@@ -534,10 +516,7 @@ class Added:
     page: PageTable | None = None
 
 
-# ------------------------------------------------------------------------------------------------
-# Figures of what happens at the formation face: clean-up, cake, filtrate, bridging.
-
-
+# ---- Figures of what happens at the formation face: clean-up, cake, filtrate, bridging.
 def fill_clean_up(
     figure: Any,
     *,
@@ -608,10 +587,7 @@ def fill_bridging(figure: Any, *, rows: Sequence[Mapping[str, Any]]) -> None:
     axes.set(ylabel="share of the throats that is closed (–)", ylim=(0, 1))
 
 
-# ------------------------------------------------------------------------------------------------
-# The stress-strain curve of a triaxial test, as a figure.
-
-
+# ---- The stress-strain curve of a triaxial test, as a figure.
 def draw_stress_strain(rows: Sequence["LoadStep"], path: Path, *, bonds: int) -> None:
     """Deviatoric stress and volume strain over axial strain; broken bonds where there are any."""
     draw(path, partial(_stress_strain, rows=rows, bonds=bonds))

@@ -36,10 +36,7 @@ def put_section(report: Path, name: str, section: str) -> bool:
     return bool(has_begin and has_end)
 
 
-# ------------------------------------------------------------------------------------------------
-# The section of the report on the mechanics of the pack; a report without it has none.
-
-
+# ---- The section of the report on the mechanics of the pack; a report without it has none.
 MECHANICS = "mechanics"
 
 
@@ -117,10 +114,7 @@ def _values(numbers: dict[str, Any], model: type[JsonObject]) -> list[tuple[str,
     ]
 
 
-# ------------------------------------------------------------------------------------------------
-# The section of the report on a core and a well; a report without it has none.
-
-
+# ---- The section of the report on a core and a well; a report without it has none.
 FORMATION = "formation"
 
 
@@ -150,10 +144,7 @@ def formation_html(folder: Path) -> str:
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# The section of the report on resolved Stokes flow; a report without it has none.
-
-
+# ---- The section of the report on resolved Stokes flow; a report without it has none.
 STOKES = "stokes"
 
 
@@ -162,10 +153,7 @@ def stokes_html(rows: Sequence[Mapping[str, Any]]) -> str:
     return page_text("report/stokes.html.j2", rows=rows)
 
 
-# ------------------------------------------------------------------------------------------------
-# report.html: one self-contained page of a run, its pictures inside.
-
-
+# ---- report.html: one self-contained page of a run, its pictures inside.
 DASH = "–"
 LEADING, STILL = "depth.svg", "spheres_3d.png"
 """The figure that stands at the top, and the picture of the specimen."""

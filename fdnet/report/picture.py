@@ -112,10 +112,7 @@ def drawing_command() -> list[str]:
     return [*first, sys.executable, "-m", "fdnet.report.picture"]
 
 
-# ------------------------------------------------------------------------------------------------
-# States of a run as a movie, one after the other (GIF or MP4), or below each other (PNG).
-
-
+# ---- States of a run as a movie, one after the other (GIF or MP4), or below each other (PNG).
 SECONDS_PER_FRAME = 30.0
 """Time that drawing one state may take."""
 WIDTH, PANEL_WIDTH = 880, 1200

@@ -62,10 +62,7 @@ AGREES = {True: "agrees", False: "disagrees", None: "not decided"}
 """Whether a rule of thumb and the run say the same."""
 
 
-# ------------------------------------------------------------------------------------------------
-# CSV tables and summary.json of a run folder: SI, units in the column names, nine digits.
-
-
+# ---- CSV tables and summary.json of a run folder: SI, units in the column names, nine digits.
 def section_rows(analysis: "Analysis") -> list[dict[str, Any]]:
     """The sections as `sections.csv` and `summary.json` name their values."""
     return [section.row() for section in analysis.sections]
@@ -253,10 +250,7 @@ def _plain(value: Any, where: str, refused: list[str]) -> Any:
     return value
 
 
-# ------------------------------------------------------------------------------------------------
-# Tables and JSON of a run folder, read back strictly.
-
-
+# ---- Tables and JSON of a run folder, read back strictly.
 class JsonObject(BaseModel):
     """What a JSON file must hold: its keys with their types; further keys are not looked at."""
 
@@ -390,10 +384,7 @@ def _again(path: Path) -> str:
     return f"write it anew with fdnet run CASE.toml --out {folder} --stages analyse,report --force"
 
 
-# ------------------------------------------------------------------------------------------------
-# The network with its conductances for OpenPNM (optional: pip install "fdnet[openpnm]").
-
-
+# ---- The network with its conductances for OpenPNM (optional: pip install "fdnet[openpnm]").
 def to_openpnm(network: Network, conductance: Array, *, viscosity: float) -> Any:
     """The part of the network that carries flow along x, as an OpenPNM network in SI units.
 

@@ -32,10 +32,8 @@ if TYPE_CHECKING:
 UM, MM, PSI = 1e6, 1e3, 6894.757
 """Micrometres and millimetres in a metre, and pascals in a pound-force per square inch."""
 
-# ------------------------------------------------------------------------------------------------
-# The case in sentences: sand, mud, drive and specimen, in the units of the field.
 
-
+# ---- The case in sentences: sand, mud, drive and specimen, in the units of the field.
 def case_words(case: Case, scales: object = None) -> Iterator[str]:
     """Some sentences that say what was run; `scales` adds the velocity of the fluid."""
     porosity = case.grains.porosity
@@ -43,10 +41,8 @@ def case_words(case: Case, scales: object = None) -> Iterator[str]:
     yield f"Sand: grains of {_size_words(case.grains)}, {packed}."
     if isinstance(case, InvasionCase):
         solids, viscosity = 100 * case.fines.volume_fraction, 1e3 * case.fluid.viscosity_Pa_s
-        yield (
-            f"Mud: fines of {_size_words(case.fines)}, {solids:.3g} % of solids by volume, in a "
-            f"liquid of {viscosity:.3g} cP."
-        )
+        mud = f"{solids:.3g} % of solids by volume, in a liquid of {viscosity:.3g} cP"
+        yield f"Mud: fines of {_size_words(case.fines)}, {mud}."
         yield _drive(case, scales)
     else:
         yield "No mud."
@@ -92,10 +88,7 @@ def _drive(case: InvasionCase, scales: object) -> str:
     return f"{text}; between the grains the fluid moves at {speed:.2g} m/s."
 
 
-# ------------------------------------------------------------------------------------------------
-# The answer of a run: one sentence to act on, how the run ended, how sure it is.
-
-
+# ---- The answer of a run: one sentence to act on, how the run ended, how sure it is.
 SMALL, LARGE = 0.02, 0.2
 """Shares of the flow that a skin costs, below and above which words call it small and large."""
 ENDS = {
@@ -251,10 +244,7 @@ def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-# ------------------------------------------------------------------------------------------------
-# A run in lines of text, and the same in a notebook; the page shows the same facts.
-
-
+# ---- A run in lines of text, and the same in a notebook; the page shows the same facts.
 WIDTH = 96
 """Letters in a line of running text."""
 _HEAD = (
@@ -384,10 +374,7 @@ def section_cells(row: Mapping[str, Any]) -> Iterator[str]:
     yield str(row["fines_count"])
 
 
-# ------------------------------------------------------------------------------------------------
-# The answer of `fdnet permeability` as lines for a terminal.
-
-
+# ---- The answer of `fdnet permeability` as lines for a terminal.
 def thesis_law_warning(chosen: "Analysis", default: "Analysis") -> str:
     """What laws that are off by factors give, with what fdnet's default laws give of the same."""
     own = " and ".join(filter(None, (default.law, default.damage_law_used)))

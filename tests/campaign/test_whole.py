@@ -183,7 +183,8 @@ def test_the_fast_model_runs_without_liggghts_and_the_page_says_so(swept, tmp_pa
     assert [float(row["k_damaged_m2"]) for row in rows(out / "table.csv")][1] == k
     assert {row["method"] for row in rows(out / "table.csv")} == {"network"}
     assert not list(out.rglob("in.invade"))
-    again = fdnet.ensemble(fdnet.read_case(case), fast=True, seeds=2, out=out, engine="local")
+    how = {"seeds": 2, "out": out, "stages": ("pack", "invade", "analyse"), "engine": "local"}
+    again = fdnet.ensemble(fdnet.read_case(case), fast=True, **how)
     assert again.summary["k_damaged_m2"]["mean"] > 0
     assert "fast model" not in str(fdnet.open_runs(swept[0]))
 

@@ -38,12 +38,10 @@ def main(arguments: list[str]) -> int:
     options = parser.parse_args(arguments)
     out = options.out or Path("studies/thesis-quick" if options.quick else "docs/thesis")
     refuse_folder_name(out)
-    states, runs = STATES, Path("runs/thesis")
-    if options.out or options.quick:
-        states, runs = out / "states", out / "runs"
-    plan, failed = planned(quick=options.quick), []
-    if not options.redraw:
-        failed = make_runs(plan, states, runs, jobs=options.jobs)
+    own = options.out or options.quick
+    states, runs = (out / "states", out / "runs") if own else (STATES, Path("runs/thesis"))
+    plan = planned(quick=options.quick)
+    failed = [] if options.redraw else make_runs(plan, states, runs, jobs=options.jobs)
     compared = write_all(plan, out, states)
     print(compared.groupby(["trend", "scale", "laws", "verdict"]).size().to_string())
     print(f"tables and figures: {out}")

@@ -27,12 +27,10 @@ MARGIN, OVERLAP, PASSED, ROUNDING = 0.20, 0.05, 0.05, 1e-9
 """Losses of porosity are alike within a fifth of the larger. Overlap over a diameter and share of
 fines passed through above which a remark is made. Differences that count as none."""
 QUANTITIES: Mapping[str, Any] = {row.quantity: row for row in rows_in("quantities.csv")}
-"""The quantities of a run by name, from quantities.csv.
-
-`values` gives one from rows of results.csv, in its `unit`; `thesis` is the thesis's number of it,
-times `scale`. It may depend on the pair of laws, may grow with the specimen, so that a borrowed
-spread is widened, and may be too small when fines pass through (`deep`).
-"""
+"""The quantities of a run: `values` gives one from rows of results.csv, in its `unit`; `thesis` is
+the thesis's number of it, times `scale`. It may depend on the pair of laws, may grow with the
+specimen, so that a borrowed spread is widened, and may be too small when fines pass (`deep`). A
+`response` is how values answer to the drag: slope or rank correlation."""
 
 
 def values_in(rows: Table, quantity: str) -> Table:
@@ -83,10 +81,10 @@ def mean_of(values: Any, lent: Any = (), *, grows: bool = False) -> Mean:
     """
     if not len(values):
         return Mean(math.nan)
-    mean, own = float(np.mean(values)), len(values) >= 3
-    if not own and len(lent) < 3:
+    mean, own, factor = float(np.mean(values)), len(values) >= 3, 1.0
+    used = values if own else lent
+    if len(used) < 3:
         return Mean(mean, seeds=len(values))
-    used, factor = (values, 1.0) if own else (lent, 1.0)
     if not own and grows and np.mean(lent) > 0:
         factor = max(1.0, mean / float(np.mean(lent)))
     same = np.ptp(used) <= ROUNDING * np.max(np.abs(used))
@@ -138,14 +136,6 @@ def _sections(name: str, first: int = 1, last: int = SECTIONS) -> list[str]:
 
 
 # ---- The seven trends of the thesis's chapter 4 and Figure 14: trends.csv.
-RESPONSES: Mapping[str, tuple[str, str]] = {
-    "mean depth per decade of drag": ("mean depth", "mm"),
-    "depth of 95 % per decade of drag": ("depth of 95 %", "mm"),
-    "rank correlation of mean depth with drag": ("mean depth", ""),
-}
-"""How a quantity answers to the drag: the quantity, and the unit of the response."""
-
-
 def trends(results: Table) -> list[dict[str, Any]]:
     """Rows of trends.csv: every comparison of claims.csv at full scale and in the quick forms.
 
@@ -155,11 +145,10 @@ def trends(results: Table) -> list[dict[str, Any]]:
     made = []
     for scale, prefix in (("full scale", ""), ("quick forms", QUICK)):
         for claim in rows_in("claims.csv"):
-            name = RESPONSES.get(claim.quantity, (claim.quantity,))[0]
-            names = [prefix + one for one in (claim.one, claim.other) if one]
-            if claim.quantity in RESPONSES and not responses(results, names[0], claim.quantity):
+            names, what = [prefix + o for o in (claim.one, claim.other) if o], claim.quantity
+            if QUANTITIES[what].response and not responses(results, names[0], what):
                 continue
-            for laws in LAWS if QUANTITIES[name].by_law else ("",):
+            for laws in LAWS if QUANTITIES[what].by_law else ("",):
                 if laws != LAWS[2] or any(len(rows_of(results, one, laws)) for one in names):
                     made.append({"trend": int(claim.trend), "scale": scale, "laws": laws})
                     made[-1] |= _compared(results, claim, names, laws or LAWS[0])
@@ -176,13 +165,13 @@ def responses(results: Table, run: str, response: str) -> list[float]:
     scanned = rows.id.str.extract(r"^(\S+) drag\.multiplier=(\S+)$")
     x = scanned[1].astype(float).where(rows.id != run, 1.0)
     table: Table = pd.DataFrame({"x": np.log10(x), "seed": rows.seed})
-    table["y"] = values_in(rows, RESPONSES[response][0])
+    table["y"] = values_in(rows, response)
     made = []
     for _, one in table[(rows.id == run) | (scanned[0] == run)].dropna().groupby("seed"):
         x, y = one.x.to_numpy(), one.y.to_numpy()
         if len(one) < 3:
             continue
-        if response.startswith("rank"):
+        if QUANTITIES[response].response == "rank":
             made.append(0.0 if np.ptp(y) == 0 else float(spearmanr(x, y).statistic))
         else:
             made.append(float(np.dot(x - x.mean(), y) / np.dot(x - x.mean(), x)))
@@ -194,21 +183,19 @@ def _compared(results: Table, claim: Any, names: Sequence[str], laws: str) -> di
     values = [one.mean for one in means] + ([] if claim.other else [float(claim.bound)])
     gap, half = values[0] - values[1], half_width(*means)
     margin = MARGIN * max(values) if claim.sense == "alike" else math.nan
-    name, *unit = RESPONSES.get(claim.quantity, (claim.quantity,))
-    row = {"quantity": claim.quantity, "unit": unit[0] if unit else QUANTITIES[name].unit}
+    row = {"quantity": claim.quantity, "unit": QUANTITIES[claim.quantity].unit}
     row |= {"sense": claim.sense, "one": names[0], "other": names[1] if claim.other else ""}
     row |= {"one_value": values[0], "other_value": values[1], "difference": gap}
     row |= {"low": gap - half, "high": gap + half, "margin": margin}
     row |= {"verdict": verdict(claim.sense, gap - half, gap + half, margin)}
     row |= {"runs_one": means[0].seeds, "runs_other": means[1].seeds if claim.other else 0}
     row["spread"] = "; ".join(dict.fromkeys(one.spread for one in means if one.spread))
-    notes = _notes(results, names, claim, deep=bool(QUANTITIES[name].deep))
-    return row | {"note": "; ".join(notes)}
+    return row | {"note": "; ".join(_notes(results, names, claim.quantity))}
 
 
 def _mean(results: Table, run: str, quantity: str, laws: str) -> Mean:
     names = [run] if run.startswith(QUICK) else [run, QUICK + run]
-    if quantity in RESPONSES:
+    if QUANTITIES[quantity].response:
         return mean_of(*(responses(results, name, quantity) for name in names))
     samples = (values_of(results, name, quantity, laws) for name in names)
     return mean_of(*samples, grows=bool(QUANTITIES[quantity].grows))
@@ -222,9 +209,9 @@ def verdict(sense: str, low: float, high: float, margin: float) -> str:
     return "holds" if holds else "does not hold" if fails else "not decided"
 
 
-def _notes(results: Table, names: Sequence[str], claim: Any, *, deep: bool) -> Iterator[str]:
+def _notes(results: Table, names: Sequence[str], quantity: str) -> Iterator[str]:
     """What weakens a comparison: missing runs, runs that did not plug, fines that passed."""
-    if claim.quantity in RESPONSES:
+    if QUANTITIES[quantity].response:
         scanned = results.id.str.startswith(f"{names[0]} drag.multiplier=")
         names = [*dict.fromkeys(results.id[scanned | (results.id == names[0])])]
     for name in names:
@@ -237,6 +224,6 @@ def _notes(results: Table, names: Sequence[str], claim: Any, *, deep: bool) -> I
         if rows.max_overlap.max() > OVERLAP:
             yield f"fines of {name} overlap by up to {rows.max_overlap.max():.0%} of a diameter"
         passed, inside = int(rows.passed_count.sum()), int(rows.invaded_count.sum())
-        if deep and passed > PASSED * (inside + passed):
+        if QUANTITIES[quantity].deep and passed > PASSED * (inside + passed):
             share = passed / (inside + passed)
             yield f"{share:.0%} of the fines passed through {name}, so they went deeper still"

@@ -214,8 +214,8 @@ def _sections(every: Any, panel: Any, sources: Sources) -> None:
                 axes.plot(np.arange(len(given)) + 0.5, given, **mark)
         axes.plot([], [], ":", color=GREY, label="in place")
         axes.set(xlim=(0, edges[-1]), ylim=(0, 1.05))
-        title = "by the thesis's laws" if laws == "thesis" else "by fdnet's laws"
-        axes.set_title(title, fontsize=9, loc="left")
+        words = "the thesis's" if laws == "thesis" else "fdnet's"
+        axes.set_title(f"by {words} laws", fontsize=9, loc="left")
 
 
 def _bars(axes: Any, panel: Any, sources: Sources) -> None:
@@ -260,12 +260,6 @@ def _scan(every: Any, panel: Any, sources: Sources) -> None:
 
 
 # ---- Spheres seen from the side.
-def middle_slab(spheres: Snapshot) -> Snapshot:
-    """Spheres centred less than the largest grain diameter behind the middle plane, along y."""
-    behind = spheres.position[:, 1] - spheres.box[1].mean()
-    return spheres.where((behind >= 0) & (behind < 2 * spheres.grains().radius.max()))
-
-
 def _colours(spheres: Snapshot, by_size: bool) -> Array:
     """Greys (N, 3) of grains, lighter when nearer; fines orange, or by size as in Figure 21."""
     y = spheres.position[:, 1]
@@ -299,14 +293,18 @@ def _paint(axes: Any, spheres: Snapshot, *, by_size: bool) -> None:
 
 
 def _spheres(axes: Any, panel: Any, sources: Sources) -> list[str]:
-    """The pack, a slab of the invaded pack, or the invaded fines by size."""
+    """The pack, a slab one grain thick behind the middle of the invaded one, or the invaded fines
+    by size."""
     run, what = sources.runs[panel.specimens[0]][0], panel.names[0]
     if what == "pack":
         _paint(axes, run.state.grains, by_size=False)
         return [f"{len(run.state.grains):,} grains"]
-    fines, slab = run.state.damaged.fines(), middle_slab(run.state.damaged)
-    inside = fines.where(fines.position[:, 0] >= fines.box[0, 0])
-    _paint(axes, slab if what == "slab" else inside, by_size=what == "sizes")
+    spheres = run.state.damaged
+    behind = spheres.position[:, 1] - spheres.box[1].mean()
+    shown = (behind >= 0) & (behind < 2 * spheres.grains().radius.max())
+    if what == "sizes":
+        shown = (spheres.kind == Kind.FINE) & (spheres.position[:, 0] >= spheres.box[0, 0])
+    _paint(axes, spheres.where(shown), by_size=what == "sizes")
     return [f"{run.thesis.invaded_count:,} invaded fines"]
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import pandas as pd
 
-TABLE3 = "table3"
 Between = tuple[float, float] | None
 """(low, high) of a range [low, high); None for a quantity itself."""
 
@@ -27,7 +26,7 @@ def published() -> Mapping[str, Any]:
     """All numbers: `first_section_mm`, `specimens` by name, `statistic` and `deposition`."""
     tables = tomllib.loads(Path(__file__).with_name("published.toml").read_text(encoding="utf-8"))
     specimens = {f"specimen{one['id']}": one for one in tables["specimen"]}
-    specimens[TABLE3] = tables[TABLE3]
+    specimens["table3"] = tables["table3"]
     for one in specimens.values():
         one["porosity_loss"] = one["porosity"] - one["damaged_porosity"][0]
     return tables | {"specimens": specimens}
@@ -52,14 +51,13 @@ def reductions(one: Mapping[str, Any]) -> Sequence[float]:
 def statistics_of(run: str) -> Mapping[tuple[str, Between], Mapping[str, Any]]:
     """Numbers on pores and throats of the run's specimen, by quantity and range."""
     number = specimen_of(run).removeprefix("specimen")
-    every = published()["statistic"]
-    return {key_of(one): one for one in every if one["specimen"] == number}
+    return {key_of(one): one for one in published()["statistic"] if one["specimen"] == number}
 
 
 def key_of(statistic: Mapping[str, Any]) -> tuple[str, Between]:
     """Quantity and range of a statistic."""
-    between = statistic.get("between")
-    return statistic["quantity"], None if between is None else (between[0], between[1])
+    low_high = statistic.get("between")
+    return statistic["quantity"], low_high and (low_high[0], low_high[1])
 
 
 def in_words(sense: str, value: float, scale: float = 1.0) -> str:

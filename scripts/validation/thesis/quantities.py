@@ -136,15 +136,14 @@ CUT = "with those cut by a face, by the part inside"
 
 
 class Section(NamedTuple):
-    """Pores (P) and throats (T) of a run, weighted for the first millimetre by WHOLE or CUT.
-
-    The weight of "pore" and "throat" is 1 for one that counts whole and 0 for one elsewhere.
-    """
+    """Pores (P) and throats (T) of a run, weighted for the first millimetre by WHOLE or CUT: 1 for
+    one that counts whole and 0 for one elsewhere; `throat_depth` is that of its middle, m."""
 
     run: Run
     network: Network
     fines: Any
     weight: Mapping[str, Array]
+    throat_depth: Array
 
 
 def first_section(run: Run, reading: str) -> Section:
@@ -154,22 +153,17 @@ def first_section(run: Run, reading: str) -> Section:
     pores of four grains of the specimen and throats between two such; CUT also those cut by its
     faces, each by the part inside, which together fill the section.
     """
-    network, end = run.thesis.network, run.thesis.network.box[0, 0] + MM
+    network, face = run.thesis.network, run.thesis.network.box[0, 0]
     group = network.pore_group[network.throat_pores]
-    pore = network.pore_position[:, 0] < end
-    throat = (network.throat_ends[:, :, 0].mean(axis=1) < end) & (group[:, 0] != group[:, 1])
+    depth = network.throat_ends[:, :, 0].mean(axis=1)
+    pore = network.pore_position[:, 0] < face + MM
+    throat = (depth < face + MM) & (group[:, 0] != group[:, 1])
     pores, throats = network.pore_share, network.throat_share
     if reading == WHOLE:
         pores = (network.pore_share == 1.0).astype(float)
         throats = pores[network.throat_pores].all(axis=1).astype(float)
     weight = {"pore": np.where(pore, pores, 0.0), "throat": np.where(throat, throats, 0.0)}
-    return Section(run, network, run.thesis.occupancy, weight)
-
-
-def throat_depth(section: Section) -> Array:
-    """(T,) mm, depth of the middle of each throat of the specimen."""
-    network = section.network
-    return np.asarray(1e3 * (network.throat_ends[:, :, 0].mean(axis=1) - network.box[0, 0]))
+    return Section(run, network, run.thesis.occupancy, weight, depth - face)
 
 
 POROSITY = "porosity of throats with fines"
@@ -188,7 +182,7 @@ FIELDS: Mapping[str, tuple[str, str, Callable[[Section], Array]]] = {
         "pore",
         lambda s: 1e9 * (s.network.pore_volume - s.fines.pore_solid_volume),
     ),
-    "throat depth": ("mm", "throat", throat_depth),
+    "throat depth": ("mm", "throat", lambda s: 1e3 * s.throat_depth),
     POROSITY: ("", "throat", lambda s: s.fines.throat_porosity),
     "conductance": ("mm3", "throat", lambda s: 1e9 * s.run.thesis.conductance_initial),
     "conductance with fines": ("mm3", "throat", lambda s: 1e9 * s.run.thesis.conductance_damaged),
@@ -204,11 +198,8 @@ def weighted(section: Section, name: str) -> tuple[Array, Array]:
 
 
 def within(values: Array, between: tuple[float, float]) -> Array:
-    """Whether each value (N,) lies in [low, high).
-
-    A low end of 0 also takes in what overlap puts below it; a high end of 1, a porosity's, also
-    takes in what is at it.
-    """
+    """Whether each value (N,) lies in [low, high); a low end of 0 also takes in what overlap puts
+    below it, and a high end of 1, a porosity's, what is at it."""
     low, high = between[0] or -math.inf, between[1] if between[1] != 1.0 else math.inf
     return np.asarray((values >= low) & (values < high))
 
@@ -223,14 +214,12 @@ def _filled(section: Section, what: str) -> float:
     return 1e9 * float(np.sum(section.weight[what] * solid))
 
 
-def _free(section: Section, what: str, volume: Array) -> float:
-    """Share of the `volume` of throats' cylinders, or of pore bodies, that no fine fills."""
-    return 1.0 - _filled(section, what) / (1e9 * float(np.sum(section.weight[what] * volume)))
-
-
-def _free_of_throats(section: Section) -> float:
+def _free(section: Section, what: str) -> float:
+    """Share of throats' cylinders, or of pore bodies, that no fine fills."""
     network = section.network
-    return _free(section, "throat", np.pi * network.throat_radius**2 * network.throat_length)
+    cylinders = np.pi * network.throat_radius**2 * network.throat_length
+    volume = cylinders if what == "throat" else network.pore_volume
+    return 1.0 - _filled(section, what) / (1e9 * float(np.sum(section.weight[what] * volume)))
 
 
 def _mean_porosity(section: Section) -> float:
@@ -251,8 +240,8 @@ SINGLES: Mapping[str, tuple[str, Callable[[Section], float]]] = {
         lambda s: float(np.sum((s.weight["throat"] > 0) & (s.network.throat_radius == 0))),
     ),
     "mean porosity of throats with fines": ("", _mean_porosity),
-    "overall throat porosity": ("", _free_of_throats),
-    "overall pore-body porosity": ("", lambda s: _free(s, "pore", s.network.pore_volume)),
+    "overall throat porosity": ("", lambda s: _free(s, "throat")),
+    "overall pore-body porosity": ("", lambda s: _free(s, "pore")),
     "volume of fines in throats": ("mm3", lambda s: _filled(s, "throat")),
     "volume of fines in pore bodies": ("mm3", lambda s: _filled(s, "pore")),
     "share of throats in the volume of fines": ("share", _in_throats),
@@ -270,11 +259,9 @@ def measure(section: Section, quantity: str, between: known.Between) -> tuple[fl
 
 
 def statistics(run: Run) -> Iterator[dict[str, Any]]:
-    """Rows of statistics.csv: every quantity that the thesis has for any specimen.
-
-    Each is measured by the readings WHOLE and CUT. Rows of the section's grains tessellated alone,
-    the thesis's own reading, were made by an earlier script.
-    """
+    """Rows of statistics.csv: every quantity that the thesis has for any specimen, by the readings
+    WHOLE and CUT. Those of the section's grains tessellated alone, the thesis's own reading, were
+    made by an earlier script."""
     wanted = dict.fromkeys(known.key_of(one) for one in known.published()["statistic"])
     for reading in (WHOLE, CUT):
         section = first_section(run, reading)
@@ -297,8 +284,7 @@ def fines_in_class(section: Section, between: tuple[float, float]) -> Mapping[st
     within the throat, `weight` and index of the `throat`.
     """
     fines, weight = section.fines, section.weight["throat"]
-    chosen = within(fines.throat_porosity, between) & (weight > 0)
-    use = chosen[fines.pair_throat]
+    use = (within(fines.throat_porosity, between) & (weight > 0))[fines.pair_throat]
     throat = fines.pair_throat[use]
     pairs = {"distance": fines.pair_distance[use], "volume": fines.pair_volume[use]}
     return pairs | {"weight": weight[throat], "throat": throat}
@@ -324,11 +310,11 @@ def deposition(run: Run) -> Iterator[dict[str, Any]]:
         wall, low, high = 1.0 - shares["nearer_axis"], math.nan, math.nan
         if total:  # Wilson 1927, J. Am. Stat. Assoc. 22, 209
             low, high = binomtest(round(wall * total), int(total)).proportion_ci(method="wilson")
-        row = dict(zip(("low", "high"), claim["throat_porosity"], strict=True)) | {"whole": True}
+        least, most = claim["throat_porosity"]
+        row = {"id": run.item.id, "seed": run.item.seed, "low": least, "high": most, "whole": True}
         row["throats"] = float(np.sum(section.weight["throat"][np.unique(fines["throat"])]))
         row |= {"fines": total, **shares, "wall_low": low, "wall_high": high}
         row["law"] = "" if not total else DEPOSITION if wall > 0.5 else CLOGGING
         row |= {"decided": low > 0.5 or high < 0.5, "nearer": told.get("nearer", "")}
         row |= {"thesis": told.get("value", math.nan), "sense": told.get("sense", "")}
-        row = {"id": run.item.id, "seed": run.item.seed, **row}
         yield row | {"source": claim["source"]}

@@ -18,7 +18,7 @@ from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError
 from fdnet.files import replacing, write_text
 from fdnet.spheres.snapshot import Array, Kind, Snapshot
-from validation.thesis.published import TABLE3, rows_in
+from validation.thesis.published import rows_in
 
 
 # ---- The plan.
@@ -115,13 +115,9 @@ def make_runs(plan: Sequence[Planned], states: Path, runs: Path, *, jobs: int) -
 
 
 # ---- The states.
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """A specimen before and after its invasion.
-
-    `grains` are as packed, `damaged` are the grains and all remaining fines at the end, those
-    upstream too, m. The ending has numbers of the run by the names of results.csv.
-    """
+    """A specimen before and after its invasion, with the fines upstream, and how that ended."""
 
     case: InvasionCase
     grains: Snapshot
@@ -136,8 +132,8 @@ def state_of_run(folder: Path) -> State:
     names = ("stop_reason", "seconds", "steps", "dt_s", "max_overlap", "supplied")
     ending = {name: invasion[name] for name in names} | {"passed": summary["passed_count"]}
     ending["pack_seconds"] = run.manifest["pack"]["seconds"]
-    spheres = {"grains": run.spheres("initial"), "damaged": run.spheres("damaged")}
-    return State(case=with_fines(run.case), ending=ending, **spheres)
+    both = run.spheres("initial"), run.spheres("damaged")
+    return State(with_fines(run.case), *both, ending)
 
 
 def write_state(path: Path, state: State) -> None:
@@ -160,7 +156,7 @@ def read_state(path: Path) -> State:
     text = json.loads(arrays["text"].tobytes())
     case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
     grains, damaged = (_spheres(arrays, name, case) for name in ("grains", "damaged"))
-    return State(case=case, grains=grains, damaged=damaged, ending=text["ending"])
+    return State(case, grains, damaged, text["ending"])
 
 
 def find_state(states: Path, item: Planned) -> State | None:
@@ -169,7 +165,7 @@ def find_state(states: Path, item: Planned) -> State | None:
     Table 3 has that of specimen 7, the same invasion. Raises CaseError for one of another case.
     """
     case = item.load()
-    twin = replace(item, name=item.name.replace(TABLE3, "specimen7"))
+    twin = replace(item, name=item.name.replace("table3", "specimen7"))
     for path in filter(Path.exists, (states / item.file, states / twin.file)):
         state = read_state(path)
         if state.case.digest("invade") == case.digest("invade"):
