@@ -14,7 +14,6 @@ from tests.network.packs import face_centred, random_pack, simple_cubic, snapsho
 
 ALL, SIDES, NONE = (True,) * 3, (False, True, True), (False,) * 3
 SC_SPACING = 2.0
-EDGE = 3 * SC_SPACING
 
 
 def measure(
@@ -75,17 +74,6 @@ def test_a_shake_of_any_size_leaves_k_continuous():
             assert moved.k_initial == pytest.approx(still.k_initial, rel=near)
             void = moved.network.pore_volume.sum() / np.prod(np.ptp(pack.box, axis=1))
             assert periodic == NONE or void == pytest.approx(porosity, abs=1e-6 + 10 * size)
-
-
-def test_one_layer_is_the_lattice_its_mirror_images_make_up():
-    layer = simple_cubic()
-    one = layer.where(layer.position[:, 0] < SC_SPACING)
-    one = snapshot(
-        one.position + np.array([0.8, 0, 0]), 1.0, [[0, SC_SPACING], [0, EDGE], [0, EDGE]]
-    )
-    assert measure(one).k_initial == pytest.approx(
-        measure(layer, periodic=ALL).k_initial, rel=1e-6
-    )
 
 
 def test_a_box_thinner_than_a_grain_between_planes_of_symmetry_is_the_lattice():
