@@ -335,10 +335,8 @@ def shortcut(
     instead_series: str | None = None,
     signed: bool = True,
 ) -> Shortcut:
-    """The shortcut of taking `value` of the knob, next to `instead`, of another series or not.
-
-    `says` and `error_of` are words for the reader. Raises CaseError when one was not run.
-    """
+    """The shortcut of taking `value` of the knob, next to `instead`, of another series or not;
+    `says` and `error_of` are words for the reader."""
     one, other = (
         [level for level in levels(rows, name, quantity) if same_value(level.value, wanted)]
         for name, wanted in ((series, value), (instead_series or series, instead))

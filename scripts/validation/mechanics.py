@@ -196,11 +196,7 @@ def stress(trial: Trial, *, stiffness: float) -> dict[str, float]:
 
 
 def displacement_under_flow(
-    grains: Snapshot,
-    material: PackMaterial,
-    gradient: float,
-    *,
-    periodic: tuple[bool, bool, bool],
+    grains: Snapshot, material: PackMaterial, gradient: float, *, periodic: tuple[bool, bool, bool]
 ) -> Array:
     """Displacement (N, 3), m, of the grains by a fall of pressure along x of `gradient` Pa/m.
 

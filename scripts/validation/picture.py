@@ -108,24 +108,11 @@ def _draw_lines(axes: "Axes", lines: Sequence[Line], panel: Mapping[str, Any]) -
     size = 7 if max(len(one.words) for one in lines) < 52 else 6.2
     for place, one in enumerate(reversed(lines)):
         face = one.colour if one.resolved else "white"
-        axes.errorbar(
-            100 * one.error,
-            place,
-            xerr=100 * one.band,
-            fmt="o",
-            color=one.colour,
-            mfc=face,
-            capsize=2,
-            markersize=4,
-        )
-        axes.text(
-            0.01,
-            place + 0.24,
-            one.words,
-            fontsize=size,
-            transform=axes.get_yaxis_transform(),
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5},
-        )
+        dot: Any = {"fmt": "o", "color": one.colour, "mfc": face, "capsize": 2, "markersize": 4}
+        axes.errorbar(100 * one.error, place, xerr=100 * one.band, **dot)
+        above: Any = {"fontsize": size, "transform": axes.get_yaxis_transform()}
+        white = {"facecolor": "white", "edgecolor": "none", "pad": 0.5}
+        axes.text(0.01, place + 0.24, one.words, bbox=white, **above)
     _scale(axes, lines, panel)
     if "limits" in panel:
         axes.set_xlim(panel["limits"])

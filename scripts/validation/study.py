@@ -180,11 +180,7 @@ def measure_point(study: Study, point: Point, work: Path) -> dict[str, Any]:
         numbers, status = {}, f"refused: {words}"
     except MemoryError:
         numbers, status = {}, "over memory"
-    costs = {
-        "core_s": processors() - before,
-        "rss_mb": peak_resident_bytes() / 1e6,
-        "steps": None,
-    }
+    costs = {"core_s": processors() - before, "rss_mb": peak_resident_bytes() / 1e6, "steps": None}
     return {**costs, **numbers, "status": status}
 
 

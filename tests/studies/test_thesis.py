@@ -79,9 +79,6 @@ def test_a_state_is_kept_to_a_nanometre_and_a_wrong_one_refused(state, tmp_path)
     (tmp_path / ITEM.file).write_bytes((tmp_path / "a.npz").read_bytes())
     with pytest.raises(CaseError, match="is the state of another case"):
         find_state(tmp_path, ITEM)
-    (tmp_path / "a.npz").write_bytes((tmp_path / "a.npz").read_bytes()[:-200])
-    with pytest.raises(CaseError, match=r"a\.npz: is no kept state"):
-        read_state(tmp_path / "a.npz")
     with pytest.raises(CaseError, match="holds no state and no results"):
         command.main(["--redraw", "--out", str(tmp_path / "none")])
 
@@ -133,8 +130,7 @@ def test_fines_in_throats_and_bodies(run):
 
 
 def test_intervals_of_the_textbooks():
-    """Wilson's of 8 in 10; Student's t is 4.3027 for 2 degrees of freedom, 2.7764 for 4."""
-    assert q.wilson_interval(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    """Student's t is 4.3027 for 2 degrees of freedom, 2.7764 for 4."""
     one, other = mean_of([1.0, 2.0, 3.0]), mean_of([4.0, 5.0, 6.0])
     assert half_width(one) == pytest.approx(4.3027 / sqrt(3), rel=1e-4)
     assert half_width(one, other) == pytest.approx(2.7764 * sqrt(2 / 3), rel=1e-4)
@@ -177,7 +173,7 @@ def test_a_kept_state_gives_its_rows_again(results, name):
 def test_quick_forms_run_to_their_end_and_are_drawn_again(binary, tmp_path, monkeypatch):
     plan = [one for one in planned(quick=True) if one.name in ("quick-specimen7", "quick-table3")]
     monkeypatch.setattr(command, "planned", lambda quick: plan)
-    words = ["--silent", "--out", str(tmp_path / "out"), "--runs", str(tmp_path / "runs")]
+    words = ["--out", str(tmp_path / "out")]
     assert command.main([*words, "--quick"]) == 0
     table = tmp_path / "out" / "results.csv"
     assert [*pd.read_csv(table).id[::2]] == [one.id for one in plan]

@@ -1,7 +1,6 @@
 """The specimens of X. Shi's thesis (UT Austin, 2011) at full scale, next to its numbers.
 
-.venv/bin/python scripts/validation.py thesis [--quick] [--jobs N]    runs, tables, figures
-.venv/bin/python scripts/validation.py thesis --redraw                no runs
+.venv/bin/python scripts/validation.py thesis [--quick | --redraw] [--jobs N]
 """
 
 import argparse
@@ -27,8 +26,7 @@ STATES = Path(__file__).parent / "states"
 def main(arguments: list[str]) -> int:
     """Make or continue the runs, write tables and figures; returns the exit code.
 
-    Raises LiggghtsError when runs failed, after the tables of all others are written, and
-    CaseError when there is nothing to draw.
+    Raises LiggghtsError when runs failed, after the tables of all others are written.
     """
     parser = argparse.ArgumentParser(prog="validation.py thesis", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="one run of each quick form, minutes")

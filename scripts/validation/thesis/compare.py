@@ -24,8 +24,8 @@ Table = Any  # rows of results.csv as a pandas table, or a column of it
 LAWS = ("thesis, thesis", "lubrication, auto", "lubrication, all-spheres")
 """The thesis's laws, an earlier default of fdnet (rows of earlier scripts), and that of today."""
 MARGIN, OVERLAP, PASSED, ROUNDING = 0.20, 0.05, 0.05, 1e-9
-"""Losses of porosity are alike within a fifth of the larger. Overlap over a diameter and share of
-fines passed through above which a remark is made. Differences that count as none."""
+"""Share of the larger loss within which losses are alike, overlap over a diameter and share passed
+above which a remark is made, and differences that count as none."""
 QUANTITIES: Mapping[str, Any] = {row.quantity: row for row in rows_in("quantities.csv")}
 """The quantities of a run: `values` gives one from rows of results.csv, in its `unit`; `thesis` is
 the thesis's number of it, times `scale`. It may depend on the pair of laws, may grow with the
@@ -75,10 +75,8 @@ class Mean(NamedTuple):
 
 
 def mean_of(values: Any, lent: Any = (), *, grows: bool = False) -> Mean:
-    """The mean of values; fewer than three borrow the spread of those lent.
-
-    What grows with the specimen keeps at least its relative spread.
-    """
+    """The mean of values; fewer than three borrow the spread of those lent, at least their
+    relative one where it `grows` with the specimen."""
     if not len(values):
         return Mean(math.nan)
     mean, own, factor = float(np.mean(values)), len(values) >= 3, 1.0

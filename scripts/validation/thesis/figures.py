@@ -25,7 +25,6 @@ from validation.thesis.quantities import POROSITY, WHOLE, Run, first_section, me
 from validation.thesis.runs import points
 
 COLOURS = ("", BLUE, GREEN, ORANGE, "#56B4E9", "#E69F00", "#000000", "#CC79A7", GREY)
-"""Of specimens 1 to 8 (Okabe and Ito 2008)."""
 MARK: Any = {"color": "black", "marker": "D", "markerfacecolor": "white", "linestyle": ""}
 MARK |= {"zorder": 5, "clip_on": False}
 LOST, SHARE = "porosity lost", "share of the fines per 0.25 mm"
@@ -68,7 +67,7 @@ def _fill(figure: Any, *, panel: Any, sources: Sources) -> None:
         axes.set_ylabel(panel.y)
     lines = kind(every if count > 1 else every[0], panel, sources) or []
     numbers = [one.removeprefix("specimen") for one in panel.specimens if "specimen" in one]
-    of = f", specimen{'s' if len(numbers) > 1 else ''} {', '.join(numbers)}" if numbers else ""
+    of = f", specimen{'s' * (len(numbers) > 1)} {', '.join(numbers)}" if numbers else ""
     head = f"Figure {panel.figure}{of}: {panel.text}" if panel.figure[0].isdigit() else panel.text
     figure.suptitle("\n".join([head, *lines]), fontsize=9, x=0.02, ha="left")
     entries = [axes.get_legend_handles_labels() for axes in figure.axes]
@@ -121,13 +120,14 @@ def _depth(axes: Any, panel: Any, sources: Sources) -> None:
             style = {"color": colour, "label": name} if len(panel.names) > 1 else _style(runs)
             _stairs(axes, edges, [_by_depth(run, name)[1] for run in runs], **style)
             axes.set_xlim(0, edges[-1])
-    if len(panel.specimens) == 1 and panel.names[0] == LOST:
+    alone = panel.names[0] if len(panel.specimens) == 1 else ""
+    if alone == LOST:
         whole, face = thesis["porosity_loss"], thesis.get("face_porosity_loss")
-        label = f"thesis, whole specimen: {whole:.2g}"
-        axes.axhline(whole, color="black", linestyle=":", label=label)
+        words = f"thesis, whole specimen: {whole:.2g}"
+        axes.axhline(whole, color="black", linestyle=":", label=words)
         if face is not None:
             axes.plot(0, face, label="thesis, at the face: about", **MARK)
-    if len(panel.specimens) == 1 and panel.names[0] == SHARE:
+    if alone == SHARE:
         deep, first = thesis["invaded_depth_mm"], thesis.get("fraction_first_bin")
         axes.axvline(deep, color="black", linestyle=":", label=f"thesis, depth {deep:g} mm")
         if first is not None:
@@ -185,9 +185,9 @@ def _distance(axes: Any, panel: Any, sources: Sources) -> list[str]:
     words = ("nearer the axis", "nearer the wall", "centred beyond the wall")
     parts, ends = (slice(0, 5), slice(5, 10), slice(10, 20)), [0.0, 0.5, 1.0, np.inf]
     shares = np.histogram(values, ends)[0] / len(values)
-    for part, colour, word, one in zip(parts, (ORANGE, BLUE, GREY), words, shares, strict=True):
-        label = f"{word}: {100 * one:.2g} %"
-        axes.bar(edges[part], height[part], 0.1, align="edge", color=colour, label=label)
+    for part, color, word, one in zip(parts, (ORANGE, BLUE, GREY), words, shares, strict=True):
+        style = {"align": "edge", "color": color, "label": f"{word}: {100 * one:.2g} %"}
+        axes.bar(edges[part], height[part], 0.1, **style)
     lines = [f"{len(values)} fines"]
     for claim in known.published()["deposition"]:
         if claim["throat_porosity"] == [float(one) for one in panel.names] and "nearer" in claim:
@@ -251,8 +251,9 @@ def _scan(every: Any, panel: Any, sources: Sources) -> None:
             axes.plot([*curve], mean, "o-", color=colour, label=case)
             axes.fill_between([*curve], low, high, color=colour, alpha=0.2, linewidth=0)
         if name == "deepest fine":
-            deep = thesis_of("table3")["invaded_depth_mm"]
-            axes.plot(1.0, deep, label="thesis, Table 3", **MARK)
+            axes.plot(
+                1.0, thesis_of("table3")["invaded_depth_mm"], label="thesis, Table 3", **MARK
+            )
         axes.set_xscale("log" if group == "drag" else "linear")
         axes.set_ylim(bottom=0)
         unit = QUANTITIES[name].unit
@@ -293,8 +294,7 @@ def _paint(axes: Any, spheres: Snapshot, *, by_size: bool) -> None:
 
 
 def _spheres(axes: Any, panel: Any, sources: Sources) -> list[str]:
-    """The pack, a slab one grain thick behind the middle of the invaded one, or the invaded fines
-    by size."""
+    """The pack, a slab a grain thick through the invaded one, or the invaded fines by size."""
     run, what = sources.runs[panel.specimens[0]][0], panel.names[0]
     if what == "pack":
         _paint(axes, run.state.grains, by_size=False)

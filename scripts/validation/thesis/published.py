@@ -11,8 +11,7 @@ from typing import Any
 
 import pandas as pd
 
-Between = tuple[float, float] | None
-"""(low, high) of a range [low, high); None for a quantity itself."""
+Between = tuple[float, float] | None  # a range [low, high); None for a quantity itself
 
 
 def rows_in(name: str) -> list[Any]:
@@ -61,6 +60,5 @@ def key_of(statistic: Mapping[str, Any]) -> tuple[str, Between]:
 
 
 def in_words(sense: str, value: float, scale: float = 1.0) -> str:
-    """A number of the thesis, such as "about 70"; "" before an exact one."""
-    reported = f"{round(scale * value, 6):.6g}"
-    return reported if sense in ("", "exact") else f"{sense} {reported}"
+    """A number of the thesis, such as "about 70" or an exact one alone."""
+    return f"{sense.removeprefix('exact')} {round(scale * value, 6):.6g}".strip()

@@ -24,7 +24,7 @@ from validation.thesis.runs import Planned, State
 MM, SECTIONS = 1e-3, 8
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Run:
     """The state of one run, and its analyses by the thesis's laws and by fdnet's own."""
 
@@ -45,8 +45,7 @@ def examine(item: Planned, state: State) -> Run:
     """Analyse a state with the sections and bins of its case."""
     laws = [("thesis", "thesis"), (DEFAULT_LAW, ALL_SPHERES)]
     how: Any = {"periodic": state.case.periodic, "options": state.case.analysis}
-    thesis, own = compare(state.grains, state.damaged, laws=laws, **how)
-    return Run(item=item, state=state, thesis=thesis, own=own)
+    return Run(item, state, *compare(state.grains, state.damaged, laws=laws, **how))
 
 
 def share(part: Array, weights: Any = 1.0) -> float:
@@ -69,9 +68,8 @@ def deep_near_wall(run: Run) -> float:
 def result_rows(run: Run) -> list[dict[str, Any]]:
     """Rows of results.csv, one for each pair of laws; NAME_1 to NAME_8 are those of the sections.
 
-    Porosity counts overlap once; shares of fines are by number; reductions are 1 - k/k0, of
-    sections cut out of the specimen, and in place by the pressures of the whole. Counts of the
-    thesis are for specimens of its size alone.
+    Porosity counts overlap once; shares of fines are by number; reductions are 1 - k/k0, of slabs
+    cut out and in place. Counts of the thesis are for specimens of its size alone.
     """
     return [_row(run, analysis) for analysis in (run.thesis, run.own)]
 
@@ -147,12 +145,9 @@ class Section(NamedTuple):
 
 
 def first_section(run: Run, reading: str) -> Section:
-    """The pores and throats centred within 1 mm of the face; a throat midway between its pores.
-
-    Facets within one polyhedron, which may be split in several ways, are no throats. WHOLE counts
-    pores of four grains of the specimen and throats between two such; CUT also those cut by its
-    faces, each by the part inside, which together fill the section.
-    """
+    """The pores and throats centred within 1 mm of the face; facets within one polyhedron are no
+    throats. WHOLE counts pores of four grains of the specimen and throats between two such; CUT
+    also those cut by its faces, each by the part inside, which together fill the section."""
     network, face = run.thesis.network, run.thesis.network.box[0, 0]
     group = network.pore_group[network.throat_pores]
     depth = network.throat_ends[:, :, 0].mean(axis=1)
@@ -294,8 +289,7 @@ def deposition(run: Run) -> Iterator[dict[str, Any]]:
     """Rows of deposition.csv: shares of the fines by place, for classes of throat porosity.
 
     `law` is by the thesis's rule: deposition where most fines are nearer the wall or beyond it.
-    `decided` tells whether the 95 % interval of that share leaves out 1/2; it takes the fines as
-    independent, which fines of one throat are not quite.
+    `decided` tells whether the 95 % interval of that share, of independent fines, leaves out 1/2.
     """
     section = first_section(run, WHOLE)
     for claim in known.published()["deposition"]:

@@ -138,8 +138,8 @@ def state_of_run(folder: Path) -> State:
 
 def write_state(path: Path, state: State) -> None:
     """Keep a state in one compressed file of single precision (0.5 nm at 8 mm)."""
-    text = json.dumps({"case": state.case.toml(), "ending": dict(state.ending)})
-    arrays = {"text": np.frombuffer(text.encode(), np.uint8)}
+    text = json.dumps({"case": state.case.toml(), "ending": dict(state.ending)}).encode()
+    arrays = {"text": np.frombuffer(text, np.uint8)}
     for name, spheres in (("grains", state.grains), ("damaged", state.damaged)):
         place = np.column_stack([spheres.position, spheres.radius])
         arrays[f"{name}_place"] = place.astype(np.float32)
