@@ -29,11 +29,7 @@ from fdnet.files import SMALL, expanded, file_bytes, text_of
 _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _FINER = r"passing|finer|under|smaller|less|<"
 _COARSER = r"retained|over|coarser|larger|greater|>"
-_SIZES = (
-    r"size|diam|sieve|mesh|opening|apertur|screen|particle|grain|durchm|korn|masch|sieb|tamis"
-    r"|maill|taille|tamiz|tama|^[dx]?$"
-)
-_RADII = r"radi|rayon|^r$"
+_RADII = r"radi|^r$"
 _POWERS = {
     "mass": r"mass|weight|\bwt|vol|q3",
     "number": r"number|count|\bnum|\bno\b|\bnr\b|q0",
@@ -85,16 +81,11 @@ def parse_sizes(text: str, *, by: str = "mass") -> tuple[list[float], list[float
     if points[0][0] > points[-1][0]:
         points.reverse()
     largest = max(share for _, share in points)
-    if whole == 100 and 0 < largest <= _MOST_FRACTION:
+    if (0 < largest <= _MOST_FRACTION) != (whole == 1):
         raise ValueError(
-            f"column {header[percents]!r}: its numbers end at {largest:g} and look like fractions "
-            "of 1, expected percentages that end at 100; multiply them by 100, or name the column "
-            "'fraction finer' or 'cumulative fraction retained'"
-        )
-    if whole == 1 and not largest <= _MOST_FRACTION:
-        raise ValueError(
-            f"column {header[percents]!r}: holds {largest:g}, expected fractions from 0 to 1; "
-            "name the column with % where it holds percentages"
+            f"column {header[percents]!r}: its numbers end at {largest:g}, expected {whole:g}; "
+            "name it with % where it holds percentages, and 'fraction finer' or 'cumulative "
+            "fraction retained' where it holds fractions of 1"
         )
     finer = [100 * (whole - share if retained else share) / whole for _, share in points]
     return [size * factor for size, _ in points], finer
@@ -116,14 +107,7 @@ def _size_column(header: list[str]) -> tuple[int, float]:
             "as 'size_um' or 'Diameter (mm)'"
         )
     index, factor, words = columns[0]
-    if re.search(_RADII, words):
-        return index, 2 * factor
-    if not re.search(_SIZES, words):
-        raise ValueError(
-            f"column {header[index]!r}: not known as sizes of grains; name it such as 'size_um', "
-            "'Diameter (mm)' or 'Radius (mm)'"
-        )
-    return index, factor
+    return index, 2 * factor if re.search(_RADII, words) else factor
 
 
 def _share_column(header: list[str], sizes: int, by: str) -> tuple[int, bool, float]:

@@ -254,13 +254,9 @@ class Spheres(Part):
     def _own_curve(self) -> SizeCurve:
         if self.sizes is not None:
             return self.sizes.curve(self.finest_m)
-        low, high = (2 * radius for radius in self._given_range)
-        return SizeCurve(law=Uniform(low, high), by=NUMBER, low=low, high=high)
-
-    @property
-    def _given_range(self) -> tuple[float, float]:
         pair = self.radius_mm if isinstance(self.radius_mm, tuple) else (self.radius_mm,) * 2
-        return (pair[0] or 0.0) * 1e-3, (pair[1] or 0.0) * 1e-3
+        low, high = (2 * ((radius or 0.0) * 1e-3) for radius in pair)
+        return SizeCurve(law=Uniform(low, high), by=NUMBER, low=low, high=high)
 
     @property
     def has_one_curve(self) -> bool:
@@ -279,15 +275,11 @@ class Spheres(Part):
     @property
     def radius_range_m(self) -> tuple[float, float]:
         """Smallest and largest radius, m."""
-        if self.measured:
-            return 0.5 * self.curve.low, 0.5 * self.curve.high
-        return self._given_range
+        return 0.5 * self.curve.low, 0.5 * self.curve.high
 
     @property
     def ends(self) -> list[tuple[float, float]]:
         """Radius, m, and density of the smallest and the largest sphere of each material."""
-        if not self.measured:
-            return [(radius, self.density_kg_m3) for radius in self.radius_range_m]
         return [
             (0.5 * diameter, one.density)
             for one in self.components
@@ -321,9 +313,8 @@ class Spheres(Part):
         if self.measured:
             return self.curve.mean(3) / self.curve.mean(2)
         low, high = self.radius_range_m
-        return (
-            2 * (0.25 * (low + high) * (low**2 + high**2)) / ((low**2 + low * high + high**2) / 3)
-        )
+        cubes, squares = 0.25 * (low + high) * (low**2 + high**2), low**2 + low * high + high**2
+        return 2 * cubes / (squares / 3)
 
 
 Materials = Annotated[
@@ -450,10 +441,7 @@ class Fines(Spheres):
     @property
     def solids_density_kg_m3(self) -> float:
         """Mass over volume of all solids of the mud, those that are left out as well."""
-        if self.materials is None:
-            return self.density_kg_m3
-        mass, usual = sum(one.share for one in self.materials), self.density_kg_m3
-        return mass / sum(one.share / (one.density_kg_m3 or usual) for one in self.materials)
+        return sum(one.share * one.density for one in self.components)
 
     @property
     def has_one_concentration(self) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fdnet.case.case import WIDEST_THROAT, Case, InvasionCase
 from fdnet.errors import PAGE, catalogue, explained
-from fdnet.scales.clock import TAKEN_SOLIDS, spoken_memory, spoken_time
+from fdnet.scales.clock import TAKEN_SOLIDS, spoken_time
 from fdnet.scales.cost import Cost, cost_of, peak_memory
 from fdnet.scales.drag import BRIDGING
 from fdnet.scales.flow import USUAL_WELL, Losses, radial
@@ -243,7 +243,7 @@ class Checked:
         parts += f", analysis and report {spoken_time(cost.analyse_seconds)}"
         rows += [
             f"time: {spoken_time(cost.seconds)} on one idle core, within a factor of 2 ({parts})",
-            f"memory: {spoken_memory(self.memory)}",
+            f"memory: {self.memory / 1e9:.2g} GB",
         ]
         head = f"{count} thing{'s' * (count > 1)} to look at" if count else "fine"
         wrapped = textwrap.TextWrapper(

@@ -76,11 +76,6 @@ def spoken_time(seconds: float) -> str:
     return f"{hours:.2g} h ({years:.2g} years)" if years > 1 else f"{hours:.0f} h"
 
 
-def spoken_memory(size: float) -> str:
-    """An amount of memory in bytes as one says it: "700 MB", "2.3 GB"."""
-    return f"{size / 1e9:.2g} GB" if size >= 1e9 else f"{size / 1e6:.0f} MB"
-
-
 # ------------------------------------------------------------------------------------------------
 # The slab of suspension that is supplied: how many fines, how long, how often one arrives.
 
