@@ -175,7 +175,6 @@ def velocity_field(
             "expected at least 1 cell and a tolerance between 0 and 1"
         )
     if fines is not None:
-        # all of them where none is of kind fine
         deposit = fines.fines() if len(fines.fines()) else fines
     diameter, sides = 2.0 * float(skeleton.radius.mean()), sides_of(grains, periodic)
     reach = grains.box[0, 0] - (deposit.position[:, 0] - deposit.radius)
@@ -271,8 +270,7 @@ def streamlines(field: VelocityField, start: Array, *, step: float, until: float
     way = until - float(np.min(start[:, 0], initial=until))
     if not (step > 0.0 and way > 0.0):
         raise CaseError(
-            f"streamlines: a step of {step:g} m and a way of {way:g} m along x, expected both to "
-            "be positive"
+            f"streamlines: a step of {step:g} m, a way of {way:g} m, expected both to be positive"
         )
     place = np.array(start, float)
     points, moving = [place.copy()], np.ones(len(place), bool)
