@@ -35,16 +35,12 @@ _SETTINGS = (
 
 def cache_folder(sources: Path, root: Path) -> Path:
     """Folder below `root` for the code that is compiled from all modules in `sources`."""
-    digest = hashlib.sha256(repr(_compiler()).encode())
+    versions = [version(name) for name in ("numba", "llvmlite", "numpy")]
+    settings = [getattr(config, name, None) for name in _SETTINGS]
+    digest = hashlib.sha256(repr((versions, settings)).encode())
     for path in sorted(sources.rglob("*.py")):
         digest.update(str(path.relative_to(sources)).encode() + b"\0" + path.read_bytes())
     return root / f"numba-{digest.hexdigest()[:16]}"
-
-
-def _compiler() -> tuple[Any, ...]:
-    """What decides, with the sources, which code numba makes and whether it runs elsewhere."""
-    versions = (version(name) for name in ("numba", "llvmlite", "numpy"))
-    return (*versions, *(getattr(config, name, None) for name in _SETTINGS))
 
 
 def _writable_root() -> Path:
@@ -59,10 +55,7 @@ def _writable_root() -> Path:
 
 
 def _own_folder(wanted: Path) -> Path:
-    """`wanted`, closed to others, or a new folder where somebody else made it.
-
-    Cached code is run without a check, so nobody else may write it.
-    """
+    """`wanted`, closed to others, for its code is run; or a new folder where it is somebody's."""
     with contextlib.suppress(OSError):
         wanted.mkdir(mode=0o700, exist_ok=True)
         status = wanted.lstat()
@@ -131,10 +124,7 @@ class _CheckedFile(IndexDataCacheFile):
 
 
 def _checked(function: Any, files: IndexDataCacheFile) -> _CheckedFile:
-    """The files of a function, which numba would keep by the place and the age of its source.
-
-    In the shared folder both are of no account, for its name changes with the sources.
-    """
+    """The files of a function; in the shared folder neither place nor age of its source counts."""
     name, source = files._index_name.removesuffix(".nbi"), Path(function.__code__.co_filename)
     folder = Path(files._cache_path)
     if _SHARED and folder.is_relative_to(_SHARED) and source.is_relative_to(_PACKAGE):
@@ -197,11 +187,6 @@ def loops_inside(function: Any) -> Any:
     return compiled(function, **_LOOPS, _nrt=False, no_cpython_wrapper=True)
 
 
-def cores_of_numba() -> int:
-    """All cores of this process, or as many as the environment variable NUMBA_NUM_THREADS says."""
-    return int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-
-
 def _bits_of(_: Any, number: Any) -> Any:
     def generate(context: Any, builder: Any, _: Any, given: Any) -> Any:
         return builder.bitcast(given[0], context.get_value_type(types.uint64))
@@ -234,14 +219,16 @@ _here = threading.local()
 
 
 def on_all_cores(work: Callable[[Part], Result], parts: Iterable[Part]) -> list[Result]:
-    """What `work` gives for each of the `parts`, on up to `MOST_CORES` of `cores_of_numba`.
+    """What `work` gives for each of the `parts`, on up to `MOST_CORES` cores of this process.
 
-    Only functions that are `compiled_for_loops` run side by side. No part may write to what
-    another one reads or writes, so the result does not depend on the number of cores. Work that is
-    such a part itself does its own parts one after the other. The first error of a part is raised.
+    The environment variable NUMBA_NUM_THREADS may say fewer. Only functions that are
+    `compiled_for_loops` run side by side. No part may write to what another one reads or writes,
+    so the result does not depend on the number of cores. Work that is such a part itself does its
+    own parts one after the other. The first error of a part is raised.
     """
     every = list(parts)
-    cores = min(cores_of_numba(), MOST_CORES, len(every))
+    most = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    cores = min(most, MOST_CORES, len(every))
     if cores <= 1 or getattr(_here, "is_part", False):
         return [work(part) for part in every]
     with ThreadPoolExecutor(cores, initializer=setattr, initargs=(_here, "is_part", True)) as pool:

@@ -1,13 +1,10 @@
 """Nodes: the places from which the resistances of a pore's throats are counted.
 
-The node of a pore is its power centre, where that lies in the tetrahedron of the pore. Where it
-lies outside, the node is the point of the tetrahedron that is nearest to it. So the way of the
-fluid from node to node leads through the facet, and each section in which it runs lies on the
-side of the tetrahedron that it runs through. Between power centres it does not: where both lie on
-one side of a facet, the way between them leaves the facet out. Along a chain of such tetrahedra,
-which a hole in a deposit is, the flow then meets next to no resistance.
-
-Pores of one polyhedron, such as those that a face of the box cuts, keep its power centre.
+The node of a pore is its power centre or, where that lies outside of the tetrahedron, the point of
+the tetrahedron that is nearest to it. So the way of the fluid from node to node leads through the
+facet. Between power centres on one side of a facet it does not: along a chain of such tetrahedra,
+which a hole in a deposit is, the flow would meet next to no resistance. Pores of one polyhedron,
+such as those that a face of the box cuts, keep its power centre.
 """
 
 from typing import NamedTuple
@@ -83,10 +80,10 @@ def _behind(corner: Array, k: int) -> bool:
 
 @loops_in_place
 def _set_nearest(corner: Array, k: int, nearest: Array) -> float:
-    """Sets the point (3,) of a facet that is `nearest` to the power centre; gives the distance m2.
+    """Sets the point of the facet opposite `k` nearest to the power centre; gives the distance m2.
 
-    The facet is the one opposite to the corner `k`. v and w are the weights of its second and
-    third corner; signs say whether a corner or an edge is nearest (Ericson 2005, section 5.1.5).
+    v and w are the weights of its second and third corner; signs say whether a corner or an edge
+    is nearest (Ericson 2005, section 5.1.5).
     """
     i, j, m = FACETS[k, 0], FACETS[k, 1], FACETS[k, 2]
     ab, ac = less(corner, j, i), less(corner, m, i)

@@ -358,8 +358,7 @@ def permeability(
     """Permeability of spheres in plain arrays; `fdnet permeability` gives the same of a file.
 
     Args:
-        points: (N, 3) centres.
-        radii: (N,) radii, or one for all.
+        points, radii: (N, 3) centres and (N,) radii, or one radius for all.
         box: its three lengths from 0 on, (3, 2) bounds, six numbers x0, x1, y0, y1, z0, z1, or a
             (3, 3) cell whose sides lie along x, y and z, as ASE has it.
         periodic: sides that repeat: letters, True for all, or three truth values, as ASE's `pbc`.

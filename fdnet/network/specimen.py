@@ -118,12 +118,11 @@ LIKE = 1e-3
 PRESSED = 0.2
 """Part of its radius by which a grain may reach across a wall: pressed grains do."""
 MANY = 0.25
-"""Part of the spheres that would cross the sides of a periodic pack, above which those that cross
-side walls are reported."""
+"""Part of the spheres that would cross the sides of a periodic pack, above which it is said."""
 GAPS, FEWEST, MISSING, LEAST_SIDE = (0.05, 0.5), 5.0, 0.55, 2.5
 """To find walls at periodic sides: gaps between neighbours, in diameters; the number of neighbours
-across a side, and its share, below which they are missing (packs between walls have 0.1 to 0.35 of
-it, periodic ones 0.8 and more); the least side, in lengths between neighbours."""
+across a side, and its share, below which they are missing (between walls 0.1 to 0.35 of it,
+periodic 0.8 and more); the least side, in lengths between neighbours."""
 _SERIES = 2 * np.arange(200) + 1.0
 
 
@@ -156,9 +155,8 @@ def pack_doubts(spheres: Snapshot, axis: str, walls: str) -> Iterator[str]:
     if walls == "no-slip":
         yield from _crossing(spheres, periodic, axis)
     seen = spheres.where(~inside_others(spheres, periodic)[0])
-    yield from overlap_doubts(
-        max_overlap(seen.grains(), periodic), max_overlap(seen, periodic, only_fines=True)
-    )
+    of_fines = max_overlap(seen, periodic, only_fines=True)
+    yield from overlap_doubts(max_overlap(seen.grains(), periodic), of_fines)
 
 
 def _crossing(spheres: Snapshot, periodic: tuple[bool, bool, bool], axis: str) -> Iterator[str]:
@@ -205,11 +203,8 @@ def kozeny(grains: Snapshot, porosity: float) -> float:
 
 
 def _walls_at_periodic_sides(grains: Snapshot, periodic: tuple[bool, bool, bool]) -> Iterator[str]:
-    """A warning for each periodic axis along which the pack ends as at a wall.
-
-    No grain crosses its sides, and far fewer neighbours meet across them than across any plane
-    within.
-    """
+    """A warning for each periodic axis along which the pack ends as at a wall: no grain crosses
+    its sides, and far fewer neighbours meet across them than across any plane within."""
     place = wrapped(grains.position, grains.box, periodic)
     reach, (low, high) = grains.radius[:, None] * (1.0 - PRESSED), grains.box.T
     clear = np.array(periodic) & np.all((place - reach >= low) & (place + reach <= high), axis=0)
@@ -393,11 +388,10 @@ def as_snapshot(spheres: object, name: str = "spheres") -> Snapshot:
         return spheres
     if isinstance(spheres, tuple) and len(spheres) in (2, 3):
         return Snapshot.from_arrays(*spheres[:2], box=spheres[2] if len(spheres) > 2 else None)
-    text = repr(spheres)
     raise CaseError(
-        f"{name}: {text if len(text) <= 60 else text[:60] + '...'} is a "
-        f"{type(spheres).__name__}, expected a Snapshot or (points, radii, box); read one with "
-        "fdnet.read_spheres from a file, or make one with fdnet.Snapshot.from_arrays"
+        f"{name}: {spheres!r:.60} is a {type(spheres).__name__}, expected a Snapshot or (points, "
+        "radii, box); read one with fdnet.read_spheres, or make one with "
+        "fdnet.Snapshot.from_arrays"
     )
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -41,9 +41,9 @@ from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line
 
 Conduct = Callable[[Network], Array]
 """Conductance (T,) m3 of the throats of a network."""
+Kept = TypeVar("Kept")
 Cut = list[Network | NetworkError]
 """The networks of S slabs, each of its own spheres alone, or why these make none."""
-
 
 SHALLOW = 1e-6
 """A cap of less height, in radii of its sphere, is none: its sphere touches the plane."""
@@ -319,10 +319,11 @@ class Measured:
 
     __repr__ = one_line
 
-    def _once(self, make: Callable[[], Any], *key: object) -> Any:
+    def _once(self, make: Callable[[], Kept], *key: object) -> Kept:
         if key not in self._kept:
             self._kept[key] = make()
-        return self._kept[key]
+        kept: Kept = self._kept[key]
+        return kept
 
     def clean(self, law: str) -> State:
         """The first grains without fines by a conductance law, with their sections."""
@@ -331,17 +332,14 @@ class Measured:
             state = clean_state(self.specimen.first, law, self.log)
             return self._with_slabs(state, law, LAWS[law], final=False)
 
-        state: State = self._once(make, "clean", law)
-        return state
+        return self._once(make, "clean", law)
 
     def base(self, law: str) -> State:
         """The grains where they ended, without fines."""
         if not self.specimen.moved:
             return self.clean(law)
-        state: State = self._once(
-            lambda: clean_state(self.specimen.network, law, self.log), "base", law
-        )
-        return state
+        network, log = self.specimen.network, self.log
+        return self._once(lambda: clean_state(network, law, log), "base", law)
 
     def damaged(self, choices: AnalysisChoices, name: str) -> tuple[State, Damage | None]:
         """The grains with fines by the damage law `name` of the network of the grains."""
@@ -354,8 +352,7 @@ class Measured:
                 damage = _law(choices, name)(base.network, occupancy, base.conductance)
             return make_state(base.network, damage.conductance, base.halves, self.log), damage
 
-        state, damage = self._once(make, choices.law, name)
-        return state, damage
+        return self._once(make, choices.law, name)
 
     def with_fines_slabs(self, state: State, choices: AnalysisChoices, name: str) -> State:
         """A `damaged` state with its sections, whose networks hold their own part of the fines."""
@@ -372,9 +369,8 @@ class Measured:
     def all_spheres(self, choices: AnalysisChoices) -> State | None:
         """The network of grains and fines where the damage law asks for it, else None.
 
-        "auto" asks for it up to `MOST_SPHERES` grains and fines, and goes without it, with a
-        warning, where these make no network. Raises NetworkError and FlowError as
-        `all_spheres_state` does where "all-spheres" asks for it.
+        "auto" asks for it up to `MOST_SPHERES` spheres, and goes without it, with a warning, where
+        these make no network or flow. "all-spheres" then raises as `all_spheres_state` does.
         """
         specimen, fines, name = self.specimen, self.specimen.fines, choices.damage_law
         if fines is None or not len(fines) or name not in (AUTO, ALL_SPHERES):
@@ -389,8 +385,7 @@ class Measured:
             return all_spheres_state(together, specimen.edges, specimen.first, self.log)
 
         try:
-            state: State = self._once(make, "all-spheres")
-            return state
+            return self._once(make, "all-spheres")
         except (NetworkError, FlowError) as error:
             if name == ALL_SPHERES:
                 raise
@@ -402,8 +397,7 @@ class Measured:
     def _with_slabs(self, state: State, law: str, conduct: Conduct, *, final: bool) -> State:
         """The state with its sections, by their own networks for the law `lubrication`.
 
-        The other laws cut the throats of the whole network, as the thesis does, and one section
-        of a box with an inlet and an outlet is the whole.
+        The other laws cut the throats of the whole network, as the thesis does.
         """
         specimen, edges, cut = self.specimen, self.specimen.edges, None
         if law == DEFAULT_LAW and (len(edges) > 2 or specimen.first.periodic[0]):

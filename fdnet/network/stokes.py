@@ -371,10 +371,7 @@ DIFFERENCES = 10.0
 
 @loops_in_place
 def _differ(value: Array, weight: Array, share: float, result: Array) -> None:
-    """Sets value + share (6 value - sum over the neighbours) where there is a weight, else 0.
-
-    All are arrays (n0, n1, n2), which repeat along all axes.
-    """
+    """Sets value + share (6 value - sum of neighbours), which repeat, where there is weight."""
     shape, zero = value.shape, np.float32(0.0)
     beside, middle = np.float32(share), np.float32(1.0 + 6.0 * share)
     last = shape[2] - 1
@@ -519,12 +516,7 @@ class GridFlow:
 
 
 def solve(
-    lattice: Lattice,
-    position: Array,
-    radius: Array,
-    *,
-    slip: float,
-    change: float | None = None,
+    lattice: Lattice, position: Array, radius: Array, *, slip: float, change: float | None = None
 ) -> GridFlow:
     """The flow around spheres of `position` and `radius` m, superficial velocity 1 along x.
 
@@ -595,8 +587,7 @@ class StokesFlow:
     """Number of forces."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
+class Estimate(NamedTuple):
     """The permeability at zero spacing: k, m2, and its error as a share of k."""
 
     k: float

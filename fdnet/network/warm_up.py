@@ -1,8 +1,7 @@
 """Compiling of the hot loops ahead of their use: `python -m fdnet.network.warm_up`.
 
-A run starts it next to LIGGGHTS where this version has compiled nothing yet. It analyses a small
-pack by the default laws, so that the compiled code lies in the cache when the run's own analysis
-asks for it.
+A run starts it next to LIGGGHTS where this version has compiled nothing yet, so that the compiled
+code lies in the cache when the run's own analysis asks for it.
 """
 
 import subprocess

@@ -175,7 +175,6 @@ def velocity_field(
             "expected at least 1 cell and a tolerance between 0 and 1"
         )
     if fines is not None:
-        # all of them where none is of kind fine
         deposit = fines.fines() if len(fines.fines()) else fines
     diameter, sides = 2.0 * float(skeleton.radius.mean()), sides_of(grains, periodic)
     reach = grains.box[0, 0] - (deposit.position[:, 0] - deposit.radius)

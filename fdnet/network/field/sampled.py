@@ -4,8 +4,7 @@ The nodes carry velocity / phi, with the profile phi that the walls allow; it is
 linearly and multiplied by phi at the point. Nearer than PROBED_AT to a sphere it is taken at that
 distance on the same normal, and the part across the wall follows from the divergence of the part
 along it (docs/theory/resolved_flow.md). Nodes in the solid, or of a phi below LEAST_PROFILE, take
-the mean of their neighbours; in the solid, without its part across the wall. Lengths are in the
-spacing along x, from the lower corner of the grid.
+the mean of their neighbours. Lengths are in the spacing along x, from the lower corner.
 """
 
 from math import ceil, cos, floor, sin, sqrt
@@ -171,10 +170,7 @@ def _interpolated(smooth: Parts, x: float, y: float, z: float) -> Place:
 def _unbalanced(
     point: Place, cell: int, grid: CellFrame, nearby: Nearby, smooth: Parts
 ) -> tuple[Place, Place, float, Near]:
-    """Velocity with its part across a near wall as sampled; normal, d / probe and walls near.
-
-    Away from spheres the normal is 0 and d / probe is 1.
-    """
+    """Velocity, its part across a near wall as sampled; normal (or 0), d / probe (or 1), walls."""
     x, y, z = point
     normal, share = (0.0, 0.0, 0.0), 1.0
     near = wall_profile(point, cell, nearby)
@@ -216,12 +212,7 @@ def _place_on(point: Place, grid: CellFrame) -> tuple[Place, int]:
 
 @compiled
 def _spreading(
-    point: Place,
-    normal: Place,
-    radius: float,
-    grid: CellFrame,
-    nearby: Nearby,
-    smooth: Parts,
+    point: Place, normal: Place, radius: float, grid: CellFrame, nearby: Nearby, smooth: Parts
 ) -> float:
     """Divergence along a sphere of the velocity along it, at `radius` from its centre."""
     p, q, r = normal
@@ -286,8 +277,7 @@ def _sample_velocity(
 def velocity_at(lattice: Lattice, nearby: Nearby, smooth: Parts, points: Array) -> Array:
     """Velocity (N, 3) at points (N, 3) m, from the `smooth_parts` of a grid.
 
-    It is 0 in the solid and outside of walls, and (1, 0, 0) before and beyond the grid along x
-    where that does not repeat.
+    It is 0 in the solid and outside of walls, (1, 0, 0) before and beyond a grid with ends.
     """
     wraps = np.array([lattice.repeats, not lattice.walled[1], not lattice.walled[2]])
     frame = CellFrame(np.array(lattice.shape), lattice.spacing / lattice.unit, wraps)
@@ -373,11 +363,7 @@ def _filled(flow: Array, phi: Array) -> Array:
 def _turn_along_walls(
     component: int, step: Array, nearby: Nearby, smooth: Parts, part: Array
 ) -> None:
-    """Takes the part across its sphere from velocity / phi at nodes in the solid.
-
-    Across a wall that is 0 at the wall, along it not. `part` holds the nodes of this component of
-    `smooth` without those added around, and is changed.
-    """
+    """Takes the part across its sphere from velocity / phi at nodes in the solid, in `part`."""
     shape = part.shape
     away = np.full(3, 0.5)
     away[component] = 0.0

@@ -34,13 +34,11 @@ class Neighbourhood(NamedTuple):
     are counted twice); their porosity is 1 - `DENSEST`."""
 
 
-def local_porosity(
-    spheres: Snapshot, periodic: tuple[bool, bool, bool], *, reach: float = REACH
-) -> Neighbourhood:
+def local_porosity(spheres: Snapshot, periodic: tuple[bool, bool, bool]) -> Neighbourhood:
     """The porosity around each fine of `spheres`, in their order.
 
     Volumes count by the weight (1 - (a/R)^2)^2 at the distance a from the centre of the fine, up
-    to R = `reach` radii. With W the weighted volume of the ball less what grains and walls take of
+    to R = `REACH` radii. With W the weighted volume of the ball less what grains and walls take of
     it, S that of the fines in it and V that of the fine itself, the solid fraction is
 
         s = (S - V S0(s')) / W,  s' = (S - V) / (W - V),  S0(s) = (1 - s)^4 / (1 + 2 s)^2.
@@ -56,18 +54,15 @@ def local_porosity(
     if not len(fines):
         return Neighbourhood(np.ones(0), np.ones(0), 0)
     radius = fines.radius
-    ball = reach * np.maximum(radius, float(np.sum(radius**3) / np.sum(radius**2)))
+    ball = REACH * np.maximum(radius, float(np.sum(radius**3) / np.sum(radius**2)))
     space = _of_ball(ball, ball) - _behind_walls(fines, ball, periodic)
     if len(grains := spheres.grains()):
         space -= _taken(fines, grains, ball, periodic)[:, 0]
     solid, surface = _taken(fines, fines, ball, periodic).T
     fraction = _fraction(solid, np.maximum(space, solid), _of_ball(radius, ball))
     dense = fraction > DENSEST
-    return Neighbourhood(
-        porosity=1.0 - np.where(dense, DENSEST, fraction),
-        size_ratio=radius * surface / solid,
-        capped=int(np.sum(dense)),
-    )
+    porosity = 1.0 - np.where(dense, DENSEST, fraction)
+    return Neighbourhood(porosity, radius * surface / solid, int(np.sum(dense)))
 
 
 def _fraction(solid: Array, space: Array, own: Array) -> Array:
@@ -128,8 +123,8 @@ def weighted_volume(radius: float, distance: float, ball: float) -> float:
     """Volume, m3, of a sphere at a `distance` from the centre of a ball of radius `ball`, m.
 
     It counts by the weight (1 - (a/R)^2)^2 at the distance a from the centre, R = `ball`. A sphere
-    of radius r whose centre lies at D cuts pi a / D (r^2 - (D - a)^2) out of the spherical surface
-    of radius a, for |D - r| < a < D + r, and all of it for a < r - D.
+    of radius r whose centre lies at D cuts pi a / D (r^2 - (D - a)^2) out of the surface of radius
+    a, for |D - r| < a < D + r, and all of it for a < r - D.
     """
     around = min(max(radius - distance, 0.0), ball)
     square = (around / ball) ** 2

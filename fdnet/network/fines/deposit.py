@@ -122,8 +122,7 @@ def _search(
 # term is the integral of cos theta.
 #
 # The volume is a third of that surface, plus d / 3 times the area common to triangle and disc
-# (divergence theorem). Strobl, Formella and Poeschel 2016 (J. Comput. Phys. 311, 158) decompose by
-# facets and edges too.
+# (divergence theorem; compare Strobl, Formella and Poeschel 2016, J. Comput. Phys. 311, 158).
 
 
 ROUNDING = 1e-13
@@ -188,8 +187,7 @@ def _piece(place: Array, normal: Array, depth: Array, cuts: int) -> tuple[float,
     """Volume and surface of the unit ball about the origin inside a tetrahedron.
 
     `place` (4, 3) are its corners, `normal` (4, 3) the inward normals of its facets, `depth` (4,)
-    the distances of the facets and `cuts` the number of facets that cut the ball: the piece is the
-    whole ball, a cap, or the sum over facets and edges.
+    their distances and `cuts` the number of them that cut the ball.
     """
     if cuts == 0:
         return 4.0 / 3.0 * pi, 4.0 * pi
@@ -259,21 +257,14 @@ def _shadow(
 
 FLAT = 1e-14
 """Volume over the cube of the longest edge, below which a tetrahedron is flat."""
-PARTS = {
-    1: [[(0, 0), (0, 1), (0, 2), (0, 3)]],
-    2: [
-        [(0, 0), (0, 2), (0, 3), (1, 1)],
-        [(0, 2), (0, 3), (1, 1), (1, 2)],
-        [(0, 3), (1, 1), (1, 2), (1, 3)],
-    ],
-    3: [
-        [(0, 0), (1, 1), (2, 2), (0, 3)],
-        [(1, 1), (2, 2), (0, 3), (1, 3)],
-        [(2, 2), (0, 3), (1, 3), (2, 3)],
-    ],
+ENDS = {
+    1: [(0, 0), (0, 1), (0, 2), (0, 3)],
+    2: [(0, 0), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3)],
+    3: [(0, 0), (1, 1), (2, 2), (0, 3), (1, 3), (2, 3)],
 }
-"""Tetrahedra that make up the part above a plane, by how many corners are above; these come first.
-(i, j) is where the edge from corner i to j meets the plane, (i, i) is corner i."""
+"""Points of the part above a plane, by how many corners are above; these come first. (i, j) is
+where the edge from corner i to j meets the plane, (i, i) is corner i. Each four in a row are the
+corners of a tetrahedron."""
 
 
 def clip_to_box(corner: Array, box: Array, periodic: tuple[bool, ...]) -> tuple[Array, Array]:
@@ -299,16 +290,14 @@ def _above(corner: Array, owner: Array, height: Array) -> tuple[Array, Array]:
     count = positive.sum(axis=1)
     whole = count == 4
     corners, owners = [corner[whole]], [owner[whole]]
-    for kept, parts in PARTS.items():
+    for kept, ends in ENDS.items():
         chosen = np.flatnonzero(count == kept)
         order = np.argsort(~positive[chosen], axis=1, kind="stable")
         place = np.take_along_axis(corner[chosen], order[:, :, None], axis=1)
         above = np.take_along_axis(height[chosen], order, axis=1)
-        cut = []
-        for part in parts:
-            points = [_meeting(place, above, i, j) for i, j in part]
-            cut.append(np.stack(points, axis=1))
-        corners.append(np.stack(cut, axis=1).reshape(-1, 4, 3))
+        points = [_meeting(place, above, i, j) for i, j in ends]
+        parts = [np.stack(points[n : n + 4], axis=1) for n in range(len(points) - 3)]
+        corners.append(np.stack(parts, axis=1).reshape(-1, 4, 3))
         owners.append(np.repeat(owner[chosen], len(parts)))
     return np.concatenate(corners), np.concatenate(owners)
 
@@ -396,10 +385,9 @@ def holders_of(network: Network) -> Holders:
 
 
 def _pieces(holders: Holders, fines: Snapshot) -> tuple[Array, Array, Array]:
-    """The tetrahedron and the fine (N,) of pairs that may touch, and what they share (N, 2).
+    """The tetrahedron and the fine (N,) of pairs that may touch, also across periodic sides.
 
-    That is the volume m3 and the surface m2 of the piece of the fine, also across periodic sides;
-    it may be 0. One size of fines after the other is searched.
+    With the volume m3 and the surface m2 (N, 2) of the piece of the fine, which may be 0.
     """
     parts = [(np.zeros(0, np.intp), np.zeros(0, np.intp), np.zeros((0, 2)))]
     low, high = holders.piece.min(axis=1), holders.piece.max(axis=1)

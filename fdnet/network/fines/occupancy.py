@@ -57,20 +57,12 @@ def exact_volume(pairs: Pairs) -> Array:
     volume = np.zeros(len(pairs.sphere))
     node, weight = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     angle = 0.5 * np.pi * node
-    rule = Rule(np.sin(angle), 0.5 * np.pi * weight * np.cos(angle))
-    _fill_volumes(pairs, rule, volume)
+    _fill_volumes(pairs, np.sin(angle), 0.5 * np.pi * weight * np.cos(angle), volume)
     return volume
 
 
-class Rule(NamedTuple):
-    """Places between -1 and 1 and weights of a rule of integration."""
-
-    place: Array
-    weight: Array
-
-
 @compiled
-def _fill_volumes(pairs: Pairs, rule: Rule, volume: Array) -> None:
+def _fill_volumes(pairs: Pairs, place: Array, weight: Array, volume: Array) -> None:
     sphere, offset, depth, tube, length = pairs
     for k in range(len(sphere)):
         a, d, r = sphere[k], offset[k], tube[k]
@@ -82,8 +74,9 @@ def _fill_volumes(pairs: Pairs, rule: Rule, volume: Array) -> None:
         total = pi * r**2 * max(min(high, covers) - max(low, -covers), 0.0)
         if r > d:
             total += _segment(a, low, min(high, -crosses)) + _segment(a, max(low, crosses), high)
-        total += _crossing(a, d, r, max(low, -crosses), min(high, -covers), rule)
-        volume[k] = total + _crossing(a, d, r, max(low, covers), min(high, crosses), rule)
+        total += _crossing(a, d, r, max(low, -crosses), min(high, -covers), place, weight)
+        total += _crossing(a, d, r, max(low, covers), min(high, crosses), place, weight)
+        volume[k] = total
 
 
 @compiled
@@ -93,17 +86,19 @@ def _segment(a: float, low: float, high: float) -> float:
 
 
 @compiled
-def _crossing(a: float, d: float, r: float, low: float, high: float, rule: Rule) -> float:
+def _crossing(
+    a: float, d: float, r: float, low: float, high: float, place: Array, weight: Array
+) -> float:
     """Integral of the lens of the sphere's disc and the tube's, whose centres are `d` apart."""
     if high <= low:
         return 0.0
     total = 0.0
-    for m in range(len(rule.place)):
-        square = a**2 - (0.5 * (low + high) + 0.5 * (high - low) * rule.place[m]) ** 2
+    for m in range(len(place)):
+        square = a**2 - (0.5 * (low + high) + 0.5 * (high - low) * place[m]) ** 2
         to_chord = (d**2 + r**2 - square) / (2.0 * d)
         half = sqrt(max(r**2 - to_chord**2, 0.0))
         lens = r**2 * atan2(half, to_chord) + square * atan2(half, d - to_chord) - d * half
-        total += rule.weight[m] * lens
+        total += weight[m] * lens
     return 0.5 * (high - low) * total
 
 
@@ -111,10 +106,9 @@ def _crossing(a: float, d: float, r: float, low: float, high: float, rule: Rule)
 def _place_by_axis(
     start: Array, end: Array, throat: Array, point: Array, image: Array
 ) -> tuple[Array, Array]:
-    """Distance (K,) m of points from the axes of throats, and their place (K,) m along the axis.
+    """Distance (K,) m of `point[image]` from the axis of a throat, and its place (K,) m along it.
 
-    The point `point[image]` goes with the axis from `start[throat]` to `end[throat]`. A throat
-    between two pores at one place has the direction x.
+    A throat between two pores at one place has the direction x.
     """
     offset, depth = np.empty(len(throat)), np.empty(len(throat))
     for k in range(len(throat)):
@@ -302,10 +296,7 @@ def refuse_wide(network: Network, fines: Snapshot) -> None:
 
 
 def _touching_pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pairs]:
-    """Throat and fine (K,) of the pairs that touch, with their relative places.
-
-    Throats see the fines whose sphere reaches into the box, and their images.
-    """
+    """Throat and fine (K,) of the pairs that touch, with images, and their relative places."""
     index = np.flatnonzero(reaching_inside(network, fines))
     throat = np.flatnonzero(network.throat_radius > 0)
     ends = network.throat_ends[throat]

@@ -38,10 +38,9 @@ class Links(NamedTuple):
 
 
 def open_links(network: Network, conductance: Array) -> Links:
-    """The links that carry flow from the inlet to the outlet face of the box.
+    """The links that carry flow from the inlet to the outlet face of the box, as in `solve_flow`.
 
-    They are what `solve_flow` solves where x is not periodic. `conductance` (T,) m3 is that of the
-    throats. Raises FlowError on a conductance that is negative or not finite.
+    `conductance` (T,) m3 is that of the throats. Raises FlowError where it is not usable.
     """
     check_conductance(conductance, len(network.throat_pores))
     span = (float(network.box[0, 0]), float(network.box[0, 1]))

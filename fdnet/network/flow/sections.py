@@ -150,8 +150,7 @@ class Layers:
 def layer_edges(box: Array, thickness: float) -> Array:
     """Edges (B+1,) m of layers of `thickness` m that fill the first millimetre of the box.
 
-    The last layer may be thinner, and a specimen that is shorter is divided as a whole. Layers
-    are thicker where there would be more than 200.
+    The last layer may be thinner. Layers are thicker where there would be more than 200.
     """
     low, high = float(box[0, 0]), float(box[0, 1])
     depth = min(FIRST, high - low)
@@ -303,10 +302,7 @@ def thin_slabs(sections: Sequence[Section], diameter: float) -> Iterator[str]:
 
 
 def make_profile(edges: Array, porosity: tuple[Porosity, Porosity], depth: Array) -> Profile:
-    """Profile between `edges` (B+1,) m of the porosity before and after, and of the fines.
-
-    `depth` (F,) m are the places of the invaded fines along x.
-    """
+    """Profile between `edges` (B+1,) m of porosity before and after, and of fines at `depth` m."""
     return Profile(
         edges=frozen(edges),
         porosity_initial=frozen(pooled(porosity[0], edges)),

@@ -34,12 +34,11 @@ Solve = Callable[[Array, float], Array]
 class Balances:
     """The system sum_j g_ij (p_i - p_j) + tied_i p_i = source_i, kept for many sources.
 
-    Up to 3,000 nodes it is solved directly. Larger systems are solved by conjugate gradients with
-    Ruge-Stuben multigrid (Ruge and Stuben 1987; second pass, strength 0.5). Multigrid works on the
-    system as it stands, whose near-kernel is the constant that the interpolation assumes; scaled
-    to a unit diagonal it needs several times the steps. Where it does not converge, the direct
-    solver is used up to `MOST_DIRECT` nodes. The study linear-solver shows what these choices
-    cost.
+    Up to 3,000 nodes it is solved directly, larger systems by conjugate gradients with Ruge-Stuben
+    multigrid (Ruge and Stuben 1987; second pass, strength 0.5). Multigrid works on the system as
+    it stands, whose near-kernel is the constant that the interpolation assumes; scaled to a unit
+    diagonal it needs several times the steps. Where it does not converge, the direct solver takes
+    up to `MOST_DIRECT` nodes. The study linear-solver shows what these choices cost.
 
     Args:
         pair: (K, 2) nodes that the links join.
@@ -120,8 +119,7 @@ def direct(matrix: sparse.csr_matrix) -> Solve:
 def factored(matrix: sparse.csr_matrix, order: Array) -> Callable[[Array], Array]:
     """Solves systems with `matrix` (n, n) by SuperLU in symmetric mode, eliminated in `order`.
 
-    A solution takes one step of iterative refinement. Raises RuntimeError where the matrix is
-    singular.
+    With one step of iterative refinement. Raises RuntimeError where the matrix is singular.
     """
     factor = splu(
         matrix[order][:, order].tocsc(),
@@ -140,10 +138,7 @@ def factored(matrix: sparse.csr_matrix, order: Array) -> Callable[[Array], Array
 
 
 def dissected(links: sparse.csr_matrix) -> Array:
-    """Order (n,) of nodes by METIS nested dissection (Karypis and Kumar 1998).
-
-    `links` (n, n) has an entry for each link; those on its diagonal are taken out.
-    """
+    """Order (n,) of the nodes of `links` (n, n) by METIS dissection (Karypis and Kumar 1998)."""
     links.setdiag(0.0)
     links.eliminate_zeros()
     if links.nnz == 0:
@@ -155,9 +150,8 @@ def dissected(links: sparse.csr_matrix) -> Array:
 def multigrid(matrix: sparse.csr_matrix) -> Solve:
     """Conjugate gradients with a symmetric Ruge-Stuben V-cycle as the preconditioner.
 
-    Nodes that are linked are brought close together in memory (Cuthill and McKee 1969, reversed):
-    a sixth faster. The solution is NaN where 100 steps do not suffice. Pores without a link stay
-    on the coarsest level, which is therefore solved as a sparse system.
+    Linked nodes stand close together in memory (Cuthill and McKee 1969, reversed): a sixth faster.
+    The solution is NaN where 100 steps do not suffice.
     """
     order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
     matrix = matrix[order][:, order]
@@ -203,9 +197,8 @@ def conjugate_gradients(
 ) -> Array:
     """Solution (n,) whose residual is at most `within` (Hestenes and Stiefel 1952).
 
-    The residual is measured by `size`, the sum of its absolute values or a norm. The solution is
-    NaN when `steps` steps (None: 100) do not suffice. Dot products are taken without BLAS, whose
-    threads would change the last digits and wait for each other.
+    The residual is measured by `size`. The solution is NaN when `steps` steps (None: 100) do not
+    suffice. Dot products go without BLAS, whose threads would change the last digits.
     """
     solution, missing = np.zeros(len(source)), source.copy()
     along, before = np.zeros(len(source)), 1.0
@@ -234,10 +227,7 @@ def conjugate_gradients(
 
 
 def groups(ends: Array, count: int) -> Array:
-    """Number (n,) of the connected group of each of `count` nodes, in the order of the nodes.
-
-    `ends` (K, 2) are the nodes that the links join.
-    """
+    """Connected group (n,) of each of `count` nodes that links between `ends` (K, 2) join."""
     return winding_groups(ends, np.zeros(len(ends)), count)[0]
 
 

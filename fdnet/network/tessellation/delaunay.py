@@ -143,11 +143,10 @@ def check_lengths(spheres: Snapshot, periodic: tuple[bool, ...]) -> None:
 def onto_walls(grains: Snapshot, periodic: tuple[bool, ...]) -> tuple[Snapshot, int]:
     """Grains with every centre inside or on the mirrored faces, and how many were centred beyond.
 
-    Of a grain centred beyond a face only a cap is inside the box. A half sphere of the volume of
-    that cap, centred on the face, takes its place: the specimen stays its own mirror image and
-    keeps its void. A centre within `ON_FACE_TOLERANCE` of a face is put on the face. At the x
-    faces it is put 1e-4 mean radii inside instead, so that the facets between three such grains
-    are throats which end in pores on the face, where the pressure is held.
+    A half sphere of the volume of the cap inside, centred on the face, takes the place of a grain
+    centred beyond it: the specimen stays its own mirror image and keeps its void. A centre within
+    `ON_FACE_TOLERANCE` of a face is put on the face; at the x faces 1e-4 mean radii inside, so
+    that the facets between three such grains are throats which end in pores on the face.
     """
     scale = float(grains.radius.mean()) if len(grains) else 0.0
     tolerance = ON_FACE_TOLERANCE * scale
@@ -327,10 +326,7 @@ def centres(
 
 @compiled
 def _solved(one: Vector, two: Vector, three: Vector, right: Vector) -> Vector:
-    """The vector with these three scalar products with three others; NaN if they lie in a plane.
-
-    Cramer's rule.
-    """
+    """The vector of these scalar products with three others (Cramer); NaN if they are flat."""
     first, second, third = times(two, three), times(three, one), times(one, two)
     determinant = along(one, first)
     scale = 1.0 / determinant if determinant != 0.0 else np.nan
@@ -427,10 +423,7 @@ def solids(points: Array, radius: Array, vertex: Array) -> tuple[Array, Array]:
 
 @compiled
 def _corner_angle(points: Array, corner: Array, i: int, triple: float) -> float:
-    """Solid angle sr at corner `i`; `triple` m3 is six times the volume.
-
-    Van Oosterom and Strackee 1983 (IEEE Trans. Biomed. Eng. 30, 125, eq. 8).
-    """
+    """Solid angle sr at corner `i` (van Oosterom and Strackee 1983); `triple`: 6 volumes."""
     a = less(points, corner[(i + 1) % 4], corner[i])
     b = less(points, corner[(i + 2) % 4], corner[i])
     c = less(points, corner[(i + 3) % 4], corner[i])
@@ -558,8 +551,8 @@ def _tessellated(
 def _power_hull(points: Array, radius: Array) -> tuple[Array, Array]:
     """Tetrahedra and neighbours (-1: none) of the power tessellation of spheres.
 
-    `points` (M, 3) are the centres and `radius` (M,) the radii. It is the lower side of the convex
-    hull of the points lifted to |x|^2 - r^2 (Aurenhammer 1987, SIAM J. Comput. 16, 78).
+    It is the lower side of the convex hull of the centres `points` (M, 3) lifted to |x|^2 - r^2
+    (Aurenhammer 1987, SIAM J. Comput. 16, 78).
     """
     about = points - 0.5 * (points.max(axis=0) + points.min(axis=0))
     lifted = np.sum(about**2, axis=1) - radius**2
@@ -589,8 +582,7 @@ def _unique(
     beyond, walled = np.zeros(len(corner), bool), ~np.array(periodic)
     for axis in np.flatnonzero(walled):
         beyond |= ~np.any(points.mirror[corner, axis] == INSIDE, axis=1)
-    # tetrahedra beyond a face belong to the specimen when their centre is on the face:
-    # they are then parts of a polyhedron that the face cuts
+    # beyond a face those belong to the specimen whose polyhedron the face cuts
     check = np.flatnonzero(good & beyond)
     vertex = corner[check]
     place = points.shaken[vertex]
@@ -600,8 +592,7 @@ def _unique(
         points.shaken, points.shaken, points.radius, vertex, flattest, 0.0
     )
     # The centre of a flat tetrahedron is arbitrary, so its centroid decides: where it stands
-    # across a face it is part of what separates two polyhedra; where it lies in the face it has no
-    # volume to give.
+    # across a face it separates two polyhedra; where it lies in it, it has no volume to give.
     centre = np.where(flat[:, None], place.mean(axis=1), centre)
     away = np.maximum(box[:, 0] - centre, centre - box[:, 1])
     good[check] = np.all((away <= tolerance) | ~walled, axis=1)

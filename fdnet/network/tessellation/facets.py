@@ -45,11 +45,8 @@ class Facets(NamedTuple):
 
 
 def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, ...]) -> Facets:
-    """Pairs of tetrahedra with a common facet.
-
-    These are neighbours, and across periods tetrahedra whose facets have the same grains at the
-    same relative shifts.
-    """
+    """Pairs of tetrahedra with a common facet: neighbours, and across periods those whose facets
+    have the same grains at the same relative shifts."""
     neighbour, points = tetrahedra.neighbour, tetrahedra.points
     one, opposite = np.nonzero(neighbour > np.arange(len(neighbour))[:, None])
     two = neighbour[one, opposite]
@@ -130,12 +127,10 @@ def tessellate(placed: PlacedGrains) -> Tessellation:
     """Unique tetrahedra of the grains in their box, and the facets they share.
 
     Images of grains are added until every sphere that must be empty lies within them and every
-    facet has its partner. Both together mean that no tetrahedron is wrong or missing. A few facets
-    of flat tetrahedra may keep no partner, because rounding splits them otherwise on the two sides
-    of a period; more images do not help them, and they are counted.
-
-    Raises NetworkError on coplanar grains, on voids larger than the images reach, on more than
-    1e-3 of the facets without partner away from the mirrored faces, and when no facet is shared.
+    facet has its partner: then no tetrahedron is wrong or missing. A few facets of flat tetrahedra
+    may keep no partner, because rounding splits them otherwise on the two sides of a period; they
+    are counted. Raises NetworkError on coplanar grains, on voids larger than the images reach, on
+    more than 1e-3 of the facets without partner, and when no facet is shared.
     """
     grains, periodic = placed.grains, placed.periodic
     count, size = len(grains), grains.box[:, 1] - grains.box[:, 0]
@@ -150,8 +145,7 @@ def tessellate(placed: PlacedGrains) -> Tessellation:
                 f"tessellation of {count} grains: {images:.3g} images up to {beyond[axis]:.3g} m "
                 f"beyond the periodic side {'xyz'[axis]} of {size[axis]:.3g} m are needed, "
                 f"expected at most {most} and {MOST_PERIODS} periods; grains or voids are far "
-                "larger than the box (check units and box), or a periodic cell of few grains is "
-                "to be repeated"
+                "larger than the box (check it and the units), or repeat a cell of few grains"
             )
         widest = ~np.array(periodic) & (margin >= size)
         tetrahedra = make_tetrahedra(grains, periodic=periodic, margin=margin)
@@ -166,8 +160,7 @@ def tessellate(placed: PlacedGrains) -> Tessellation:
     if facets is None:
         raise NetworkError(
             f"tessellation of {count} grains: voids reach {needed.max():.3g} m beyond the box of "
-            f"{size.tolist()} m, further than the images around it; give more grains or a smaller "
-            "box"
+            f"{size.tolist()} m, further than the images; give more grains or a smaller box"
         )
     if facets.unmatched > max(4, UNMATCHED_SHARE * len(facets.pore)):
         raise NetworkError(
@@ -230,9 +223,9 @@ def sections(
 
     `vertex` (T, 3) are the corners among `points` (M, 3) m with spheres of `radius` (M,) m. The
     radius is NaN where no circle touches the three discs. The area is the triangle less the
-    sectors, plus half the lens of each overlapping pair, which is so counted once (Shi 2011,
-    section 3.1.2); it is negative where discs cover more than the triangle. Spheres overlap that
-    are nearer than the sum of their radii by more than the share `touching` of it.
+    sectors, plus half the lens of each overlapping pair (Shi 2011, section 3.1.2); it is negative
+    where discs cover more than the triangle. Spheres overlap that are nearer than the sum of their
+    radii by more than the share `touching` of it.
     """
     count = len(vertex)
     inscribed, area, overlap = np.empty(count), np.empty(count), np.zeros(count, np.bool_)
@@ -259,10 +252,9 @@ def sections(
 
 @compiled
 def _inscribed(a: float, x: float, y: float, r: float, second: float, third: float) -> float:
-    """Radius m of the circle that touches three discs from outside, NaN where there is none.
+    """Radius m of the circle that touches discs at (0, 0), (a, 0) and (x, y) from outside, or NaN.
 
-    The corners are (0, 0), (a, 0) and (x, y) m, the discs there have the radii r, `second` and
-    `third` m. Solved as `touching_spheres`.
+    The discs have the radii r, `second` and `third` m. Solved as `touching_spheres`.
     """
     ux = 0.5 * (a * a + r * r - second**2) / a
     vx = (r - second) / a
@@ -374,11 +366,9 @@ def join_polyhedra(tessellation: Tessellation) -> Polyhedra:
 def _adopted_centres(tessellation: Tessellation) -> Array:
     """Centres (P, 3) m, where a flat tetrahedron has the centre of a neighbour.
 
-    The corners of a flat tetrahedron are four corners of the face between two polyhedra. Its own
-    centre depends on the shake alone. Either neighbour leaves the same flow, since both splits of
-    a face count the same. A neighbour that no other mirrored face cuts comes first, so that the
-    flat one keeps its share inside the box; of these the one with the nearest centre, whatever the
-    order of the tetrahedra.
+    Its corners are four corners of the face between two polyhedra, and either neighbour leaves the
+    same flow. One that no other mirrored face cuts comes first, so that the flat one keeps its
+    share inside the box; of these the one with the nearest centre.
     """
     tetrahedra, size = tessellation.tetrahedra, tessellation.size
     centre, known = tetrahedra.centre.copy(), ~tetrahedra.flat
@@ -423,7 +413,7 @@ def _walls(tessellation: Tessellation, centre: Array, group: Array) -> Array:
     """Mirrored faces (P, 3) that cut each polyhedron: -1 the low one, 1 the high one, 0 none.
 
     A face cuts a tetrahedron with corners on both sides of it, and one with corners beyond it
-    whose centre lies on it. What it does to one part of a polyhedron it does to all.
+    whose centre lies on it; if one part of a polyhedron, then all.
     """
     tetrahedra = tessellation.tetrahedra
     mirror = tetrahedra.points.mirror

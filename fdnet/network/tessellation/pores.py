@@ -19,9 +19,8 @@ def measure_pores(
 ) -> tuple[dict[str, Any], dict[str, int]]:
     """The arrays pore_... of the network, and counts of what is out of the ordinary.
 
-    A pore lies at the centre of the sphere that touches its four grains, or else at the centroid
-    (Shi 2011, section 3.1.2). All parts of a polyhedron have one place. What a mirrored face cuts
-    lies on that face.
+    A pore lies at the centre of the sphere that touches its four grains, else at the centroid (Shi
+    2011, section 3.1.2), all parts of a polyhedron at one place, on a mirrored face that cuts it.
     """
     tetrahedra, box = tessellation.tetrahedra, tessellation.box
     points, vertex, volume = tetrahedra.points, tetrahedra.vertex, tetrahedra.volume
@@ -57,7 +56,6 @@ def measure_pores(
         position = np.where(polyhedra.wall == side, face, position)
     cut = polyhedra.wall != 0
     radius = np.nan_to_num(np.maximum(sphere, 0.0), nan=0.0)
-    rounding = VOID_ROUNDING * float(points.radius.mean()) ** 3
     counts = {
         "centre_is_centroid": int(np.sum(~centred)),
         "pores_closed": int(np.sum(radius == 0)),
@@ -65,7 +63,7 @@ def measure_pores(
         "cospherical_groups": int(np.sum(np.bincount(polyhedra.group) > 1)),
         "pores_at_end_faces": int(np.sum(cut[:, 0])),
         "pores_at_side_walls": int(np.sum(cut[:, 1:].any(axis=1))),
-        "void_negative": int(np.sum(void < -rounding)),
+        "void_negative": int(np.sum(void < -VOID_ROUNDING * float(points.radius.mean()) ** 3)),
     }
     pores = {
         "pore_images": vertex,
@@ -85,11 +83,9 @@ def measure_pores(
 def _members(
     polyhedra: Polyhedra, centred: Array, volume: Array, period: Array
 ) -> tuple[Array, Array, Array]:
-    """Parts of the polyhedra that have several, and the part that stands for each.
+    """Parts (K,) of the polyhedra that have several, what stands for each, periods between them.
 
-    A part in which its touching sphere is `centred` (P,) goes first, then the largest `volume`
-    (P,). Returns the parts (K,), the one that stands for each (K,), and the whole periods (K, 3)
-    between the two.
+    A part in which its touching sphere is `centred` (P,) goes first, then the largest one.
     """
     group = polyhedra.group
     member = np.flatnonzero(np.bincount(group)[group] > 1)
@@ -118,8 +114,8 @@ def measure_throats(
 
     Facets that lie in an x face are left out: they join two pores of the pressure of that face.
     `throats_closed` counts where no circle fits between the three grains, `throats_overlapping`
-    open throats of which two grains overlap (the lens counts once), and `throat_area_negative`
-    those where a circle fits but three grains overlap in one place; their area is 0.
+    open throats of which two grains overlap, and `throat_area_negative` those where a circle fits
+    but three grains overlap in one place; their area is 0.
     """
     points, floor = tessellation.tetrahedra.points, LENGTH_FLOOR * tessellation.scale
     wall = polyhedra.wall[tessellation.facets.pore]
