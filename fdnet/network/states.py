@@ -231,7 +231,7 @@ def all_spheres_state(spheres: Snapshot, edges: Array, like: Network, log: Log) 
 
 FEW_THROATS = 100
 """Number of throats that carry the flow of a section (`Flow.carrying_throats`) below which its
-permeability with fines is off by 5 % (rms), above which by 2 % (docs/evidence/accuracy.md)."""
+permeability with fines is off by 5 % (rms), above which by 3 % (docs/evidence/accuracy.md)."""
 
 
 def at_most_the_grains(
@@ -301,7 +301,7 @@ def few_throats(flows: Sequence[Flow]) -> Iterator[str]:
             "few-throats",
             f"few throats carry the flow with fines ({', '.join(few)}): with fewer than "
             f"{FEW_THROATS} the permeability of a section is off by some 5 % (rms), at worst by "
-            "20 %; `fdnet stokes` gives the sections of a run by resolved flow",
+            "22 %; `fdnet stokes` gives the sections of a run by resolved flow",
         )
 
 
