@@ -114,7 +114,8 @@ def _most_mud(case: InvasionCase, throat_ratio: float) -> Slab:
         length = min(length, MUD_PORES * target_porosity(case) * case.size_m[0])
     per_length = share * area / case.fines.mean_volume_m3
     length = max(length, 2 * case.fines.radius_range_m[1], ARRIVALS / per_length)
-    length = min(length, MUD_FINES / per_length, MOST_SLAB * case.size_m[0])
+    most = math.inf if case.by_classes else MUD_FINES / per_length
+    length = min(length, most, MOST_SLAB * case.size_m[0])
     return Slab(count=max(1, round(per_length * length)), length=length)
 
 

@@ -143,10 +143,7 @@ def invasion_scales(case: InvasionCase) -> InvasionScales:
 
 
 def stiffened(case: InvasionCase, scales: InvasionScales, steps: int) -> InvasionScales:
-    """The scales of a chunk of the same time in `steps` steps, with springs as stiff as they bear.
-
-    The stiffness goes with the square of the number of steps.
-    """
+    """The scales of a chunk in `steps` steps: the stiffness goes with their square."""
     if steps == scales.checkpoint_steps:
         return scales
     run, ratio = stiff_enough(case).run, steps / scales.checkpoint_steps
@@ -293,10 +290,7 @@ def back_flow(case: InvasionCase) -> BackFlow:
 
 
 def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
-    """The case with the drawdown for its overbalance, driven at most by the same factor as before.
-
-    What its table [run] says of the length of the invasion is that of the clean-up.
-    """
+    """The case with the drawdown for its overbalance, driven by no larger factor than before."""
     fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
     turned, asked = case.model_copy(update={"fluid": fluid, "run": run}), case.drag
     if asked.drive_velocity_m_s != "fluid":
