@@ -32,12 +32,9 @@ KEYS = (
 class Case(tables.Part):
     """A pack of grains. Without fines it stays intact: it is made and analysed, not invaded.
 
-    The keys carry the unit of the user, as in a case file: `radius_mm`, `viscosity_cP`. Properties
-    such as `size_m` give the same in SI.
-
-    Make one with `fdnet.read_case` from a file, or with `fdnet.case_from` from nested tables: both
-    take a table of fines, and both raise CaseError that lists every problem. This class itself has
-    no key `fines` (see `InvasionCase`) and raises the error of pydantic.
+    The keys carry the unit of the user: `radius_mm`. Properties such as `size_m` give SI. Make one
+    with `fdnet.read_case` or `fdnet.case_from`, which raise CaseError that lists every problem;
+    this class has no key `fines` (see `InvasionCase`) and raises the error of pydantic.
 
     Examples:
         >>> import fdnet
@@ -117,10 +114,9 @@ class Case(tables.Part):
         """Hash of what `stage` depends on.
 
         "pack" ignores fluid, run and analysis, and of the fines all but what decides the ratio of
-        stiffnesses. "invade" ignores the analysis and the clean-up, "clean_up" the analysis, but
-        for side walls of a fluid that the network is made for. No
-        result depends on `POLICIES` or on the bonds, which mechanics alone reads, so no digest
-        does. One stiffness for packing and invasion counts once.
+        stiffnesses. "invade" ignores the analysis, but for side walls of a fluid that the network
+        is made for, and the clean-up; "clean_up" the analysis. No result depends on `POLICIES` or
+        on the bonds, which mechanics alone reads. One stiffness for both counts once.
         """
         data = self.data()
         data.pop("bonds", None)
@@ -166,8 +162,7 @@ class Case(tables.Part):
 class InvasionCase(Case):
     """A pack of grains and the fines that invade it: a `Case` with the table `fines`.
 
-    The keys of the fines carry the unit of the user too: `fines.radius_mm` is in mm. Make one with
-    `fdnet.read_case` or `fdnet.case_from`.
+    Make one with `fdnet.read_case` or `fdnet.case_from`.
 
     Examples:
         >>> import fdnet
@@ -293,10 +288,9 @@ def concentration_text(fines: Fines) -> str:
 
 
 class Known:
-    """The tables of a case, and which of their keys something can be said about.
+    """The tables of a case, and their keys about which something can be said.
 
-    Nothing can be said about keys whose own value was refused (`bad`), and about sizes and solids
-    that are not given exactly once.
+    That is none whose own value was refused (`bad`), and no size or solids not given exactly once.
     """
 
     def __init__(self, given: Mapping[str, Any], bad: Collection[str]) -> None:
@@ -326,11 +320,7 @@ class Known:
 
 
 def cross_problems(given: Mapping[str, Any], bad: Collection[str] = ()) -> Iterator[str]:
-    """What is wrong between the keys of a case, in the order in which it is reported.
-
-    A rule is passed over where one of its tables is absent or None, or one of its keys is among
-    `bad`: keys whose own value was refused, so that nothing can be said about them.
-    """
+    """What is wrong between the keys of a case, but for rules on its `bad` or absent keys."""
     known = Known(given, bad)
     yield from _of_the_spheres(known)
     for keys, why in EXCLUSIVE.items():

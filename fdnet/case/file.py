@@ -47,11 +47,8 @@ def read_size_file(
 
     The first line that is no comment (#) names the columns, with their units: one of sizes
     ("size_um", "Diameter (mm)", or "Radius (mm)", which is doubled) and one cumulative percentage
-    ("passing %", "cumulative % finer", or "cumulative % retained", which is turned around; shares
-    from 0 to 1 are named "fraction finer"). The rows may rise or fall. The text is UTF-8, UTF-16
-    or Windows-1252. `by` is what the case says that the percentages count; a column that says
-    another thing is refused.
-
+    ("passing %", "cumulative % retained", which is turned around, or "fraction finer" of 1). The
+    text is UTF-8, UTF-16 or Windows-1252. `by` is what the case says that the percentages count.
     Raises ValueError, with the file and what was expected, where it cannot be read so.
     """
     path = folder / expanded(name)
@@ -180,13 +177,13 @@ def table_of(annotation: Any) -> type[Part] | None:
     return next((one for kind in get_args(annotation) if (one := table_of(kind))), None)
 
 
-REMOVED_KEYS = {"clean_up.lift_cake": "the cake is always lifted, remove the key"}
-REMOVED_KEYS |= dict.fromkeys(
-    ("clean_up.quiet_ms", "clean_up.cap_ms"), "give clean_up.duration_ms, or leave it out"
-)
-REMOVED_KEYS |= dict.fromkeys(
-    ("run.skin_mm", "run.neighbour_bin_mm"), "fdnet chooses the neighbour search, remove the key"
-)
+REMOVED_KEYS = {
+    "clean_up.lift_cake": "the cake is always lifted, remove the key",
+    "clean_up.quiet_ms": "give clean_up.duration_ms, or leave it out",
+    "clean_up.cap_ms": "give clean_up.duration_ms, or leave it out",
+    "run.skin_mm": "fdnet chooses the neighbour search, remove the key",
+    "run.neighbour_bin_mm": "fdnet chooses the neighbour search, remove the key",
+}
 """Keys that are gone, and what to do without each."""
 
 
@@ -336,18 +333,11 @@ def _curve(spoken: Spoken, dotted: str, value: Any, table: Mapping[str, Any]) ->
 def case_from(data: Mapping[str, Any], *, source: str = "case", folder: str | Path = ".") -> Case:
     """A case from nested tables; an InvasionCase when there is a table of fines.
 
-    Args:
-        data: the tables and keys of a case file. A key carries its unit, `radius_mm` is in mm, or
-            its value does, `radius = "0.25 mm"`.
-        source: how messages name these tables.
-        folder: where files that `data` names are looked for.
+    A key of `data` carries its unit, as `radius_mm`, or its value does, `radius = "0.25 mm"`.
+    `source` names these tables in messages; files that they name are looked for in `folder`.
 
-    Returns:
-        The case, with the default of every key that `data` leaves out.
-
-    Raises:
-        CaseError: it lists every problem: dotted key, value given, what is allowed, and for an
-            unknown key the nearest known one.
+    Raises CaseError that lists every problem: dotted key, value given, what is allowed, and for an
+    unknown key the nearest known one.
 
     Examples:
         >>> import fdnet
@@ -524,9 +514,8 @@ def read_case(
 ) -> Case:
     """The case in the TOML file at `path`, with dotted `assignments` ("key=value") put in.
 
-    `values` does the same with values by dotted key. Lengths in the file are in mm, as its keys
-    say. Raises CaseError when the file cannot be read, is not TOML, or holds an invalid parameter;
-    the message lists every problem.
+    `values` does the same with values by dotted key. Raises CaseError when the file cannot be
+    read, is not TOML, or holds an invalid parameter; the message lists every problem.
 
     Examples:
         >>> import fdnet

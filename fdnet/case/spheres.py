@@ -323,10 +323,7 @@ Materials = Annotated[
 
 
 class Grains(Spheres):
-    """[grains], the skeleton: the sand grains of the formation.
-
-    Give either `porosity` or `count`.
-    """
+    """[grains], the sand grains of the formation; either `porosity` or `count` is given."""
 
     porosity: Fraction | None = None
     """Porosity of the pack within 0.003, overlaps counted once."""
@@ -351,12 +348,7 @@ class Grains(Spheres):
 
 
 class Fines(Spheres):
-    """[fines], the invading particles of the mud.
-
-    The mud comes until the stop rule ends the invasion; `count` or `slab_mm` says that less comes.
-
-    A case without this table has no invasion: only the intact pack is made and analysed.
-    """
+    """[fines], the solids of the mud; without this table the intact pack alone is analysed."""
 
     density_kg_m3: Positive = 2146.0
     """Density of the fines."""

@@ -97,10 +97,7 @@ M2_PER_MD = 9.869233e-16
 
 
 class Fluid(Part):
-    """[fluid], the mud's liquid.
-
-    Its velocity is given, or follows from the overbalance by Darcy's law.
-    """
+    """[fluid], the mud's liquid. Its velocity is given, or follows from the overbalance."""
 
     viscosity_cP: Positive = 50.0
     """Dynamic viscosity."""
@@ -128,10 +125,7 @@ class Fluid(Part):
 
 
 class Well(Part):
-    """[well], a vertical well in its formation: the overbalance is lost in radial flow around it.
-
-    The specimen is a piece of the formation at the face of the well.
-    """
+    """[well], a well at whose face the specimen lies: the overbalance is lost in radial flow."""
 
     radius_mm: Positive
     """Radius of the well, to the formation face."""
@@ -178,10 +172,7 @@ class ContactLaw(Part):
 
 
 class Bonds(Part):
-    """[bonds], parallel bonds: a disc of elastic cement between two grains.
-
-    Only `fdnet mechanics` reads them; the invasion has no bonds.
-    """
+    """[bonds], discs of elastic cement between two grains; `fdnet mechanics` alone reads them."""
 
     radius_ratio: Annotated[float, Field(gt=0, le=1)]
     """Radius of a bond over that of the smaller grain."""
@@ -210,10 +201,7 @@ OF_THE_UNIFORM = ("scheme", "refresh_steps", "upstream", "pressure_gradient", "i
 
 
 class Box(Part):
-    """[box], the specimen.
-
-    Flow and depth run along the first side; x = 0 is the formation face.
-    """
+    """[box], the specimen: flow and depth run along the first side from the face, x = 0."""
 
     size_mm: Triple
     """Three side lengths; the mud flows along the first."""
@@ -245,7 +233,7 @@ class Drag(Part):
         "auto",
         description="Velocity in the simulated pores, to shorten a run with a weak push; all "
         'forces are scaled alike. "fluid" (when absent with "uniform"): its own. "auto": up '
-        "to an impact Stokes number of 0.1, not with cohesion. A number: up to 1.",
+        "to an impact Stokes number of 0.1, not with cohesion. A number: up to 0.3.",
     )
     upstream: Literal["darcy", "interstitial"] = "darcy"
     """Velocity upstream of the face; "interstitial", that in the pores, brings the mud too
@@ -317,9 +305,7 @@ DEFAULT_STIFFNESS = 1.0e4
 class Run(Part):
     """[run], run control: contact stiffness, time step, when to stop and what to refuse.
 
-    `max_hours`, `max_overlap` and `on_overlap` decide only whether a run may go on. No result
-    depends on them, so they may be changed when a run is resumed. Times in ms are physical times;
-    they differ from those of the simulation with `drag.drive_velocity_m_s`.
+    Times in ms are physical ones, also with `drag.drive_velocity_m_s`.
     """
 
     stiffness_N_m: Positive | Literal["nominal", "auto"] = "auto"
@@ -384,10 +370,7 @@ class CleanUp(Part):
 
 
 class InvasionChoices(Part):
-    """[invasion], how the mud is let in: as spheres, or as size classes on the pore network.
-
-    With "network" these are all solids of the mud, also those below `fines.cut_um`.
-    """
+    """[invasion], how the mud is let in: as spheres, or as size classes on the pore network."""
 
     method: Literal["liggghts", "network", "both"] = "liggghts"
     """"liggghts": every fine is a sphere. "network": all solids are size classes, as with `fdnet
@@ -404,10 +387,7 @@ class InvasionChoices(Part):
 
 
 class MudCake(Part):
-    """[cake], the measured cake of the mud, for invasion.method = "network" or "both".
-
-    Clay and colloids make a mud's cake some million times tighter than its coarse solids do alone.
-    """
+    """[cake], the measured cake of the mud for size classes; clay makes it very tight."""
 
     permeability_m2: Annotated[float, Field(gt=0, le=1e-9)] | None = None
     """Permeability of the cake. When both are absent: by Carman and Kozeny for its classes."""
@@ -442,10 +422,7 @@ class AnalysisKeys(TypedDict, total=False):
 
 
 class AnalysisChoices(Part):
-    """[analysis], how permeability is computed.
-
-    The default laws are fdnet's most accurate pair.
-    """
+    """[analysis], how permeability is computed; the default laws are the most accurate pair."""
 
     sections: Sections = 8
     """Number of equal slabs along the flow; in Python also their edges, m."""

@@ -1,7 +1,6 @@
 """Values with their units as people write them, such as "80 um" or "25 lb/bbl".
 
-A small table instead of a unit library: importing pint takes 0.3 s, and it reads mD as
-millidebye. Conversions are decimal, so that "40 um" is exactly the number 0.04 in mm.
+Conversions are decimal, so that "40 um" is exactly the number 0.04 in mm.
 """
 
 import re
@@ -117,11 +116,7 @@ def stem_of(key: str) -> str:
 
 
 def converted(text: str, suffix: str) -> float:
-    """The value of `text` in the unit that the end of a key stands for.
-
-    Raises ValueError, with the reason in words, where the text is no number with a unit of that
-    dimension.
-    """
+    """The value of `text` in the unit of the end of a key. Raises ValueError with the reason."""
     dimension, own = SUFFIXES[suffix]
     number, factor = _read(text, dimension)
     return float(number * factor / own)

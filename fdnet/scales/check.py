@@ -57,8 +57,8 @@ WALLS = (-0.356, -0.267, -0.193, -0.197, -0.152, -0.117, -0.074)
 def width_error(width: float, *, periodic: bool) -> float:
     """Expected permeability over that of the bulk, less 1, of a specimen.
 
-    `width` is its narrower side over the mean diameter of the grains. Between the widths studied
-    it is interpolated over the logarithm; beyond the widest it falls as one over the width.
+    `width` is its narrower side over the mean diameter of the grains; between those studied it is
+    interpolated over the logarithm, beyond them the error falls as one over the width.
     """
     errors = PERIODIC if periodic else WALLS
     widths = WIDTHS[: len(errors)]

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from fdnet.case.case import Case, InvasionCase, with_fines
 from fdnet.case.tables import CONTACT_STEP_LIMIT, DEFAULT_STIFFNESS, MOST_SLAB
@@ -44,8 +44,8 @@ bridge end after two volumes of the pores, and no mud has more fines than the la
 def present_share(case: InvasionCase, *, duration: float, feeding: float) -> float:
     """Mean number of fines in the simulation over the number supplied.
 
-    The slab arrives evenly over `feeding` s of a simulation of `duration` s, in batches that come
-    ahead of what arrives. Mud without an end comes in short batches: what is there has arrived.
+    The slab arrives evenly over `feeding` s of `duration` s, in batches ahead of what arrives; mud
+    without an end comes in short ones.
     """
     if case.fines.supply == "slab":
         return 1.0
@@ -58,7 +58,7 @@ def present_share(case: InvasionCase, *, duration: float, feeding: float) -> flo
 
 
 # ------------------------------------------------------------------------------------------------
-# Times and amounts of memory in words.
+# Times in words.
 
 
 def spoken_time(seconds: float) -> str:
@@ -91,9 +91,8 @@ class Slab:
 def slab_of(case: InvasionCase, throat_ratio: float) -> Slab:
     """Number of fines n and length l of the slab, n v = c A l.
 
-    v is the mean volume of a fine, c the share by volume of the fines that are placed, A the
-    cross-section of the box. A case gives n, l or neither; then the slab is the most mud that may
-    come (`MUD_SOLIDS`). `throat_ratio` is that of the largest fine to the throats.
+    v is the mean volume of a fine, c the share of those that are placed, A the cross-section. A
+    case gives n, l or neither: then it is the most mud that may come (`MUD_SOLIDS`).
     """
     fines = case.fines
     if fines.endless:
@@ -115,7 +114,8 @@ def _most_mud(case: InvasionCase, throat_ratio: float) -> Slab:
         length = min(length, MUD_PORES * target_porosity(case) * case.size_m[0])
     per_length = share * area / case.fines.mean_volume_m3
     length = max(length, 2 * case.fines.radius_range_m[1], ARRIVALS / per_length)
-    length = min(length, MUD_FINES / per_length, MOST_SLAB * case.size_m[0])
+    most = math.inf if case.by_classes else MUD_FINES / per_length
+    length = min(length, most, MOST_SLAB * case.size_m[0])
     return Slab(count=max(1, round(per_length * length)), length=length)
 
 
@@ -143,8 +143,7 @@ ARRIVALS = 10
 """The default plug time lets at least this many fines of the undisturbed suspension arrive."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StopTimes:
+class StopTimes(NamedTuple):
     """Times of the stop rule, s of the simulation."""
 
     plug: float  # the face counts as plugged when no fine has crossed it for this time
@@ -155,9 +154,8 @@ class StopTimes:
 def stop_times(case: InvasionCase, slab: Slab, drive: Drive, *, upstream: float) -> StopTimes:
     """The times that the case gives, or those that follow from the velocities.
 
-    In a chunk the fluid passes about one grain diameter. A given duration is cut into equal
-    chunks. The times of a case are physical, and are divided by the factor of the drive.
-    `upstream` is the velocity there, m/s, simulated.
+    In a chunk the fluid passes about one grain; a given duration is cut into equal ones. Times of
+    a case are physical, `upstream` m/s is simulated.
     """
     run, clock = case.run, 1 / drive.factor
     passage = 2 * case.grains.mean_radius_m / drive.velocity

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.spheres import Spheres
@@ -25,8 +26,7 @@ STEP_OVERLAP = 0.04
 the stiffness at `REFERENCE_OVERLAP`."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PairModuli:
+class PairModuli(NamedTuple):
     """Elastic constants of a pair of materials, as they are used."""
 
     modulus: float  # E* = 1 / ((1 - nu1^2) / E1 + (1 - nu2^2) / E2), Pa
@@ -122,10 +122,7 @@ def pair_stokes(mass: float, radius: float, velocity: float, viscosity: float) -
 
 
 def wet_ratio(dry_ratio: float, stokes: float, *, least: float) -> float:
-    """Damping ratio of a contact with exp(-35 / St) of the restitution of `dry_ratio`.
-
-    z = -ln e / sqrt(ln^2 e + pi^2), with e at least `least`.
-    """
+    """Damping ratio z = -ln e / sqrt(ln^2 e + pi^2) of e, exp(-35 / St) of that of `dry_ratio`."""
     log = -math.pi * dry_ratio / math.sqrt(1 - dry_ratio**2) - FILM / stokes
     log = max(log, math.log(least))
     return -log / math.hypot(log, math.pi)
@@ -161,14 +158,11 @@ class Contact:
     friction: float  # coefficient of sliding friction
     damping_ratio: float  # damping over the critical one
     damping_rate: float  # 1/s, viscous damping force over effective mass and velocity
-    # s, half a period of the damped oscillation; of a Hertz contact the duration of an undamped
-    # collision at the velocity of the fluid
+    # s, half a damped oscillation; by Hertz an undamped collision at the velocity of the fluid
     contact_time: float
     step_limit: float  # s, sqrt(m/k) of the lighter sphere
-    # constants of a Hertz contact; None when the contact is linear
-    elastic: PairModuli | None = None
-    # impact Stokes number at the velocity of the fluid; None where the restitution does not depend
-    # on it
+    elastic: PairModuli | None = None  # of a Hertz contact
+    # impact Stokes number at the velocity of the fluid, where the restitution depends on it
     stokes: float | None = None
 
     @property
@@ -340,8 +334,7 @@ throat. Forces in packs of spheres go far beyond their mean, with an exponential
 others, Phys. Rev. Lett. 77, 274, 1996). Runs of the quick specimen 5 had 1 to 8."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Overlaps:
+class Overlaps(NamedTuple):
     """Predicted overlaps of a fine with a grain, over the diameter of the largest fine."""
 
     drag: float  # by drag and pressure gradient F on a fine at rest: F / k, or by Hertz
@@ -360,8 +353,8 @@ def overlaps_of(
 ) -> Overlaps:
     """The overlaps in the `contact` of a grain and a fine, as simulated, in a pack of a porosity.
 
-    A deposit bears the `pressure`, Pa of the fluid itself, on the section of a throat; contacts
-    hand the forces on to each other, so that some bear several times as much (`LARGEST_CHAIN`).
+    A deposit bears the `pressure`, Pa of the fluid itself, on the section of a throat, and some of
+    its contacts several times as much (`LARGEST_CHAIN`).
     """
     push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
     deposit = 0.0
@@ -432,8 +425,7 @@ def two_digits_up(value: float) -> float:
 # most at 4/9 of it. With linear springs both terms grow alike and nothing would pull.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PullOff:
+class PullOff(NamedTuple):
     """What it takes to part two cohesive spheres."""
 
     force: float  # N, the largest pull that the contact bears
@@ -501,10 +493,8 @@ class Sticking:
     friction: float  # coefficient of friction of a fine against a grain
     slope: float  # of the sides of the groove; friction below it holds no fine
     shear_ratio: float  # tangential over normal contact stiffness, force over overlap
-    # force of the fluid on the fine at rest over normal stiffness and radius, F / (k r)
-    push: float
-    # tangential force that the integrator adds in a quarter turn, over the push
-    false_force: float
+    push: float  # force of the fluid on the fine at rest over k r of the contact
+    false_force: float  # that the integrator adds in a quarter turn, over the push
     linear: bool = True  # whether the tangential stiffness can be chosen (Hertz-Mindlin's cannot)
 
     @property
@@ -540,8 +530,7 @@ def fall_velocity(push: float, mass: float, distance: float) -> float:
 def sticking_of(case: InvasionCase, contact: Contact, push: Push, step: float) -> Sticking:
     """Of the smallest fine between two of the largest grains, which locks most easily.
 
-    `contact` is that of a grain and a fine, `step` the time step, s. A fine rolls no faster than
-    it drifts freely.
+    `step` is the time step, s. A fine rolls no faster than it drifts freely.
     """
     radius, grain = case.fines.radius_range_m[0], case.grains.radius_range_m[1]
     mass = sphere_mass(radius, min(one.density for one in case.fines.components))

@@ -128,8 +128,10 @@ def expected_duration(case: InvasionCase, scales: InvasionScales) -> float:
 
 
 def expected_fines(case: Case, scales: Scales) -> float:
-    """Fines supplied; of mud that comes until the stop rule, those that come until then."""
-    if not isinstance(case, InvasionCase) or not isinstance(scales, InvasionScales):
+    """Spheres supplied; of mud that comes until the stop rule, those that come until then."""
+    if not isinstance(scales, InvasionScales) or not isinstance(case, InvasionCase):
+        return 0
+    if case.by_classes:
         return 0
     come = expected_duration(case, scales) * scales.upstream_velocity / scales.slab_length
     return scales.supplied_count * (min(1.0, come) if case.fines.endless else 1)

@@ -1,8 +1,4 @@
-"""A case from a sand, a mud and a well (`fdnet init`): how it is sized, and its file with reasons.
-
-The answers are texts with their units by the keys of `QUESTIONS`, and `name`, `sand_file` and
-`mud_file`.
-"""
+"""A case from a sand, a mud and a well (`fdnet init`): its sizes, and its file with reasons."""
 
 import json
 import math
@@ -38,13 +34,9 @@ DEFAULTS = {question.key: question.default for question in QUESTIONS}
 def filled(given: Answers, ask: Callable[[Question, str], str | None] | None) -> dict[str, str]:
     """The answers with what is missing asked for, or with defaults.
 
-    Args:
-        given: texts by the keys of `QUESTIONS`, and "sand_file" and "mud_file".
-        ask: shows why the last answer was none and a question, returns the answer; None at the
-            end of all answers, and where nobody can be asked.
-
-    Raises:
-        CaseError: answers are missing or cannot be read, and nobody can be asked; it names all.
+    `given` are texts by the keys of `QUESTIONS`, "sand_file" and "mud_file". `ask` shows why the
+    last answer was none and a question, and returns the answer; None where there are no more.
+    Raises CaseError that names all answers that are missing or cannot be read.
     """
     answers, missing, problems = dict(given), [], []
     for question in QUESTIONS:
@@ -219,8 +211,7 @@ def designed(
     even the coarsest take too long, it takes all. A choice that makes no case, or one for which
     `fdnet run` has `refusals`, does not fit.
 
-    Raises:
-        CaseError: the answers make no case; it says which, by their options.
+    Raises CaseError where the answers make no case; it says which, by their options.
     """
     sand, mud = _sizes(answers, folder)
     first = _first_choice(answers, budget, sand, mud)

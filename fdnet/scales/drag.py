@@ -107,10 +107,7 @@ def drag_factor(reynolds: float) -> float:
 
 
 def slope_factor(reynolds: float) -> float:
-    """Change of drag with slip over Stokes's, 1 + 0.15 (1 + 0.687) Re^0.687.
-
-    It shortens the time in which a fine relaxes, and so the longest stable explicit step.
-    """
+    """Change of drag with slip over Stokes's, 1 + 0.15 (1 + 0.687) Re^0.687."""
     return 1 + COEFFICIENT * (1 + EXPONENT) * reynolds**EXPONENT
 
 
@@ -180,8 +177,7 @@ def held_factor(ratio: float) -> float:
 def throat_width(porosity: float, permeability: float) -> float:
     """Diameter, m, of straight tubes with the pack's porosity and permeability, sqrt(32 k / phi).
 
-    By Poiseuille's law. It stands for the median throat: in packs of equal grains of 0.5 mm at a
-    porosity of 0.40 it is 0.141 mm, and the median of the throats' inscribed circles 0.157 mm.
+    By Poiseuille. In packs of grains of 0.5 mm at 0.40 it is 0.141 mm, the median throat 0.157 mm.
     """
     return math.sqrt(32 * permeability / porosity)
 
@@ -216,10 +212,7 @@ class Push:
         return self.coefficient * radius * self.velocity * factor + self.gradient_force(radius)
 
     def drift(self, radius: float) -> float:
-        """Velocity by which a free fine of `radius` m outruns the fluid, m/s.
-
-        It is the slip at which drag balances the force of the gradient.
-        """
+        """Velocity by which a free fine of `radius` m outruns the fluid, m/s: forces balance."""
         slip = self.gradient_force(radius) / (self.coefficient * radius)
         return balanced_slip(slip, self.reynolds_slope * radius * slip)
 
@@ -250,18 +243,14 @@ def push_of(case: Case, velocity: float, gradient: float, *, factor: float = 1.0
 def arrival_velocity(push: Push, radius: float, density: float, distance: float) -> float:
     """Velocity, m/s, with which a fine of `density` kg/m3 meets a grain at the most.
 
-    It starts with the fluid and gains speed by the gradient alone over `distance` m, but drag
-    leaves it no faster than its free drift.
+    It gains speed by the gradient alone over `distance` m, up to its free drift.
     """
     gained = math.sqrt(push.velocity**2 + 2 * push.gradient / density * distance)
     return min(push.velocity + push.drift(radius), gained)
 
 
 def pore_width(porosity: float, diameter: float) -> float:
-    """Hydraulic diameter of the pores between spheres, 2 d phi / (3 (1 - phi)), m.
-
-    Four times the volume of the pores over their surface; d is the Sauter diameter, m.
-    """
+    """Hydraulic diameter of the pores between spheres, 2 d phi / (3 (1 - phi)), m."""
     return 2 * diameter * porosity / (3 * (1 - porosity))
 
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.errors import CaseError, Doubt
@@ -12,8 +13,7 @@ ERGUN_RATIO = ERGUN_INERTIAL / ERGUN_VISCOUS
 """Loss by inertia over viscous loss, for each rho q d / (mu (1 - phi)) (Ergun 1952)."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Path:
+class Path(NamedTuple):
     """The way on which the overbalance is lost, as the lengths that count for each loss."""
 
     viscous: float  # m, the integral of q(s) / q over the way; q is the velocity at the face
@@ -34,8 +34,7 @@ class Losses:
     def velocity(self, pressure: float, path: Path) -> float:
         """Darcy velocity at the face, m/s, that loses `pressure` Pa on the way.
 
-        It is the positive root of a q + b q^2 = p, written as 2 p / (a + sqrt(a^2 + 4 b p)), which
-        holds for b = 0 as well.
+        The positive root of a q + b q^2 = p as 2 p / (a + sqrt(a^2 + 4 b p)), also for b = 0.
         """
         first, second = self.viscous * path.viscous, self.inertial * path.inertial
         return 2 * pressure / (first + math.sqrt(first**2 + 4 * second * pressure))
@@ -61,10 +60,7 @@ def straight(length: float) -> Path:
 
 
 def radial(radius: float, outer: float) -> Path:
-    """From a well of `radius` m out to `outer` m: the velocity falls with one over the distance.
-
-    viscous = r_w ln(r_e / r_w), inertial = r_w^2 (1 / r_w - 1 / r_e).
-    """
+    """From a well of `radius` m out to `outer` m: r_w ln(r_e / r_w), r_w^2 (1 / r_w - 1 / r_e)."""
     return Path(
         viscous=radius * math.log(outer / radius), inertial=radius**2 * (1 / radius - 1 / outer)
     )
@@ -80,16 +76,14 @@ USUAL_WELL = (0.108, 100.0)
 """Radius of a well of 8 1/2 inches and a drainage radius, m: the example that warnings give."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Velocity:
+class Velocity(NamedTuple):
     """Velocity of the fluid along x."""
 
     permeability: float  # m2, of the intact pack by Carman and Kozeny
     darcy: float  # m/s, flow rate over the whole cross-section
     interstitial: float  # m/s, mean velocity in the pores
     pressure_gradient: float  # Pa/m, that drives this flow through the pack
-    # share by which Ergun's inertial term lowers the velocity of Darcy's law at the same
-    # overbalance; where the velocity is given, at the gradient that Darcy's law needs for it
+    # share by which Ergun's inertial term lowers the velocity of Darcy's law at the same pressure
     inertial_loss: float
 
 
@@ -193,21 +187,19 @@ def velocity_warnings(case: InvasionCase, porosity: float, velocity: Velocity) -
 #
 # Where the inertia of a fine does not matter, its way depends on the ratios of the forces alone:
 # drag, pressure gradient, weight. A simulation may then multiply the fluid's velocity, and with it
-# every force, by one factor s = u_DEM / u. Every fine goes the same way in 1 / s of the time.
-# Inertia does not matter while the impact Stokes number is well below 1: a fine that is stopped by
-# a grain has lost its momentum to the liquid within that share of its radius.
+# every force, by one factor s = u_DEM / u, and every fine goes the same way in 1 / s of the time.
+# That is so well below an impact Stokes number of 1, the share of its radius within which a fine
+# stops.
 
 
 AUTO_STOKES = 0.1
 """Impact Stokes number to which "auto" drives the largest fine."""
-STOKES_WARNING, STOKES_LIMIT = 0.3, 1.0
-"""Impact Stokes number of a driven case: above the first value fdnet warns, above the second it
-refuses the case."""
+STOKES_LIMIT = 0.3
+"""Impact Stokes number from which the inertia of fines may matter: no case is driven above it."""
 _ROUNDING = 1 + 1e-9
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
+class Drive(NamedTuple):
     """How fast the simulated fluid moves."""
 
     velocity: float  # m/s, in the pores
@@ -228,12 +220,11 @@ def impact_stokes(relaxation_time: float, velocity: float, radius: float) -> flo
 def drive_of(case: InvasionCase, velocity: float, relaxation_time: float, free: float) -> Drive:
     """The velocity that the case asks for, or the fluid's own `velocity` in the pores, m/s.
 
-    "auto" never drives slower than the fluid moves, and not where fines cohere: cohesion is not
-    scaled with the forces of the fluid. `relaxation_time` s is that of the largest fine, `free`
-    its velocity in this fluid, m/s: faster where a pressure gradient pushes it.
+    "auto" never drives slower, and not where fines cohere: cohesion is not scaled with the forces.
+    `relaxation_time` s is that of the largest fine, `free` its velocity in this fluid, m/s.
 
-    Raises CaseError for a driven case whose impact Stokes number is above `STOKES_LIMIT`, as
-    simulated or at the fluid's own velocity.
+    Raises CaseError for a given velocity with an impact Stokes number above `STOKES_LIMIT`, as
+    simulated or in the fluid itself.
     """
     asked, driven = case.drag.drive_velocity_m_s, velocity
     own = impact_stokes(relaxation_time, free, case.fines.radius_range_m[1])
@@ -252,20 +243,6 @@ def drive_of(case: InvasionCase, velocity: float, relaxation_time: float, free: 
             f"would matter; {do}"
         )
     return Drive(velocity=driven, factor=driven / velocity, impact_stokes=stokes)
-
-
-def drive_warnings(case: InvasionCase, drive: Drive) -> list[Doubt]:
-    """A driven case in which inertia may begin to matter; empty when it does not."""
-    asked = case.drag.drive_velocity_m_s
-    if isinstance(asked, str) or drive.impact_stokes <= STOKES_WARNING * _ROUNDING:
-        return []
-    lower = drive.velocity * STOKES_WARNING / drive.impact_stokes
-    text = (
-        f"drag.drive_velocity_m_s: at {drive.velocity:.3g} m/s the impact Stokes number is "
-        f"{drive.impact_stokes:.2g} (above {STOKES_WARNING:g}), so the fines' inertia may begin "
-        f"to matter: lower it to {lower:.2g} m/s"
-    )
-    return [Doubt("driven-inertia", text)]
 
 
 # ------------------------------------------------------------------------------------------------

@@ -62,8 +62,8 @@ def reach_text(rigid: float) -> str:
 def within_limit(rigid: float, porosity: float, overlap: float, limit: float) -> float:
     """Porosity at which the largest overlap is `limit`, from a denser pack that was made.
 
-    It takes the overlap as proportional to the growth beyond close packing. `rigid` is the densest
-    porosity without overlap; `porosity` and `overlap` are those of the pack.
+    The overlap grows with that beyond `rigid`, the densest porosity without it; `porosity` and
+    `overlap` are those of the pack.
     """
     start, made = (1 - rigid) ** (1 / 3), (1 - porosity) ** (1 / 3)
     return 1 - (start + limit / overlap * (made - start)) ** 3
@@ -194,8 +194,7 @@ def grain_count(case: Case) -> int:
 def pack_step(case: Case, contact: Contact) -> float:
     """Time step of packing, s: `PACK_STEP` of sqrt(m/k) of the lightest grain.
 
-    `contact` is that of two grains. Its stiffness by Hertz is that of its tangent at
-    `grains.max_overlap`.
+    By Hertz the stiffness of the `contact` of two grains is the tangent at `grains.max_overlap`.
     """
     stiffness = contact.normal_stiffness
     if contact.elastic:

@@ -34,7 +34,7 @@ from fdnet.scales.contacts import (
     stiffness_factor,
 )
 from fdnet.scales.drag import Push, push_of, reynolds_warnings, throat_warnings, throat_width
-from fdnet.scales.flow import Velocity, drive_warnings, velocity_of, velocity_warnings
+from fdnet.scales.flow import Velocity, velocity_of, velocity_warnings
 from fdnet.scales.pack import size_warnings, target_porosity
 
 MOST_STEPS = 2**31 - 1
@@ -60,11 +60,8 @@ class Scales:
 class InvasionScales(Scales):
     """What follows from a case with fines as well, in SI units."""
 
-    # m/s, of the fluid in the pores as simulated; the fluid's own unless `drag.drive_velocity_m_s`
-    # says otherwise.
-    drive_velocity: float
-    # drive velocity over the fluid's own; the factor on all forces on a fine, and physical time
-    # over simulated time
+    drive_velocity: float  # m/s, of the fluid in the pores, as simulated
+    # drive velocity, forces on a fine, and physical time, over the fluid's own
     force_factor: float
     upstream_velocity: float  # m/s, upstream of the formation face, as simulated
     supplied_count: int  # number of fines in the slab; the most that come where the mud has no end
@@ -72,26 +69,20 @@ class InvasionScales(Scales):
     relaxation_time: tuple[float, float]  # s, of the drag on the smallest and on the largest fine
     time_step: float  # s, of the invasion
     hold_steps: int  # steps for which the drag is held
-    # s of the simulation without a crossing after which the face counts as plugged
-    plug_time: float
+    plug_time: float  # s of the simulation without a crossing that count as plugged
     cap_time: float  # s of the simulation, when the invasion ends at the latest
     checkpoint_steps: int  # steps between two checkpoints
     reynolds: float  # particle Reynolds number of the largest fine that is held
     stokes: float  # Stokes number of the largest fine at a grain, as simulated
     impact_stokes: float  # impact Stokes number of the largest fine, as simulated
     gravity_over_drag: float  # weight less buoyancy over drag, of the largest fine
-    # force of the pack's pressure gradient over Stokes's drag, of the largest fine at rest,
-    # whether or not the case lets it act
-    gradient_over_drag: float
+    gradient_over_drag: float  # pressure gradient over Stokes's drag, of the largest fine at rest
     push: Push  # drag and pressure gradient on fines in the pack, as simulated
-    # m/s, of the largest fine that the fluid carries freely in the pores, as simulated
-    drift_velocity: float
+    drift_velocity: float  # m/s, of the largest fine carried freely in the pores, as simulated
     throat_ratio: float  # diameter of the largest fine over that of the pack's throats
     impact_overlap: float  # predicted overlap by impact, over the diameter of the largest fine
-    # predicted overlap by drag and pressure gradient, over the diameter of the largest fine
-    drag_overlap: float
-    # where the flow follows the deposit, predicted overlap of fines that hold the whole pressure,
-    # over the diameter of the largest one; else 0
+    drag_overlap: float  # the same by drag and pressure gradient
+    # the same by the whole pressure, where the flow follows the deposit; else 0
     deposit_overlap: float
     sticking: Sticking  # how far a fine may lock between two grains
 
@@ -105,9 +96,8 @@ class InvasionScales(Scales):
 def scales_of(case: Case) -> Scales:
     """All scales of a case; InvasionScales when it has fines.
 
-    Raises CaseError when a time step or drag refresh breaks a stability bound (the message gives
-    the bound), when drag would press contacts shut, or when numbers are so extreme that a formula
-    overflows.
+    Raises CaseError when a step or drag refresh breaks a stability bound, when drag would press
+    contacts shut, or when a formula overflows.
     """
     try:
         rising, case = rises(case), stiff_enough(case)
@@ -153,10 +143,7 @@ def invasion_scales(case: InvasionCase) -> InvasionScales:
 
 
 def stiffened(case: InvasionCase, scales: InvasionScales, steps: int) -> InvasionScales:
-    """The scales of a chunk of the same time in `steps` steps, with springs as stiff as they bear.
-
-    The stiffness goes with the square of the number of steps.
-    """
+    """The scales of a chunk in `steps` steps: the stiffness goes with their square."""
     if steps == scales.checkpoint_steps:
         return scales
     run, ratio = stiff_enough(case).run, steps / scales.checkpoint_steps
@@ -182,9 +169,7 @@ def _invasion(
     slab, relaxation = slab_of(case, throat), relaxation_times(case)
     drive = drive_in(case, flow)
     push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
-    upstream = drive.velocity
-    if case.drag.upstream == "darcy":
-        upstream = flow.darcy * drive.factor
+    upstream = flow.darcy * drive.factor if case.drag.upstream == "darcy" else drive.velocity
     shortest = relaxation[0] * push.relaxation_share(small)
     times = stop_times(case, slab, drive, upstream=upstream)
     step, hold, chunk_steps = times.chunk, 1, 1
@@ -210,7 +195,6 @@ def _invasion(
     warnings = [*shared.warnings, *velocity_warnings(case, shared.porosity, flow)]
     if not case.by_classes:
         warnings += [
-            *drive_warnings(case, drive),
             *reynolds_warnings(case, push, reynolds, throat_ratio=throat),
             *throat_warnings(case, throat),
             *overlap_warnings(case, overlaps),
@@ -265,12 +249,11 @@ MOST_PASSAGES = 20
 class BackFlow:
     """A clean-up in numbers. Times and velocities are those of the simulation."""
 
-    case: InvasionCase  # the case of the invasion with the drawdown for the overbalance
+    case: InvasionCase  # that of the invasion with the drawdown for the overbalance
     scales: InvasionScales  # of that case; its velocities are positive
     choices: CleanUp  # the table [clean_up]
-    chunks: int  # most chunks of `scales.checkpoint_steps` steps.
-    # chunks without a fine that comes out which end it; 0 where it has a duration
-    quiet_chunks: int
+    chunks: int  # most chunks of `scales.checkpoint_steps` steps
+    quiet_chunks: int  # chunks without a fine that comes out which end it; 0 with a duration
 
     @property
     def step(self) -> float:
@@ -307,10 +290,7 @@ def back_flow(case: InvasionCase) -> BackFlow:
 
 
 def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
-    """The case with the drawdown for its overbalance, driven at most by the same factor as before.
-
-    What its table [run] says of the length of the invasion is that of the clean-up.
-    """
+    """The case with the drawdown for its overbalance, driven by no larger factor than before."""
     fluid, run = choices.fluid_of(case.fluid), choices.run_of(case.run)
     turned, asked = case.model_copy(update={"fluid": fluid, "run": run}), case.drag
     if asked.drive_velocity_m_s != "fluid":

@@ -401,6 +401,17 @@ def test_the_root_of_the_radial_law_loses_the_pressure_on_the_way():
     assert Losses(viscous=2e8).velocity(5e6, straight(0.2)) == pytest.approx(0.125, rel=1e-15)
 
 
+def test_a_run_without_spheres_is_bound_by_none_of_their_limits():
+    """Whole muds have more fines than spheres could be, and no step of LIGGGHTS is taken."""
+    mud = "fines={sizes={D10_mm=0.005, D50_mm=0.025, D90_mm=0.07}, concentration=0.02}"
+    keys = (mud, WELL, "drag={}", "invasion.method=network", "run={time_step_s=1.0}")
+    scales = scales_of(tiny(*keys))
+    assert scales.supplied_count > 1e6
+    assert scales.slab_length * 0.02 == pytest.approx(10 * 0.25 * 0.5e-3, rel=0.03)
+    with pytest.raises(CaseError, match=r"run\.time_step_s: 1 s is above the contact bound"):
+        scales_of(tiny(*keys, "invasion.method=liggghts"))
+
+
 # ------------------------------------------------------------------------------------------------
 # Fines driven at a chosen velocity: the same ratios of forces, and the clock of the fluid.
 
@@ -437,7 +448,7 @@ def test_a_drive_that_inertia_forbids_is_refused():
         CaseError, match=r"impact Stokes number of the fines is 2,.*at most"
     ) as caught:
         driven(f"drag.drive_velocity_m_s={2 * most}")
-    assert f"expected at most {most:.2g} m/s" in str(caught.value)
+    assert f"expected at most {0.3 * most:.2g} m/s" in str(caught.value)
     with pytest.raises(CaseError, match="in the fluid itself"):
         scales_of(tiny(f"fluid.velocity_m_s={2 * most}", "drag.drive_velocity_m_s=0.1"))
     keys = ("contact.model=hertz", "contact.cohesion_J_m3=1e4")
