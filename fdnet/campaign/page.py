@@ -242,11 +242,12 @@ def pair_lines(comparison: Comparison) -> list[str]:
     """Each difference with its band, and the seeds that would show one that is not shown yet."""
     lines = []
     for one, other, gap, apart in comparison.pairs():
-        how = "paired by seed, same packs" if gap.paired else "packs not shared"
+        how = ", paired by seed, same packs" if gap.paired else ", packs not shared"
+        how = "" if math.isnan(gap.p_value) else how
         needed = f"; it needs some {gap.seeds_needed} seeds of each" if gap.seeds_needed else ""
         verdict = "they differ" if apart else f"not distinguished{needed}"
         band = band_text(comparison.ranked_by, gap.band)
-        lines.append(f"{one} and {other}: difference {band}, {how}; {verdict}.")
+        lines.append(f"{one} and {other}: difference {band}{how}; {verdict}.")
     return lines
 
 

@@ -207,3 +207,9 @@ def test_the_answer_names_the_variants_that_are_as_good(tmp_path):
     apart = compared(tmp_path / "two", {"a": values["a"], "c": values["c"]})
     page = (apart.path / "compare.html").read_text()
     assert "It is the smallest, and differs from every other variant." in page
+
+
+def test_two_single_runs_say_nothing_of_their_packs(tmp_path):
+    made = compared(tmp_path, {"a": [0.4], "b": [0.5]})
+    said = "a and b: difference −10.0 % (no band: one run); not distinguished."
+    assert made.differences == (said,)

@@ -187,6 +187,9 @@ def test_the_fast_model_runs_without_liggghts_and_the_page_says_so(swept, tmp_pa
     again = fdnet.ensemble(fdnet.read_case(case), fast=True, **how)
     assert again.summary["k_damaged_m2"]["mean"] > 0
     assert "fast model" not in str(fdnet.open_runs(swept[0]))
+    plain = ["ensemble", str(case), "--gather", "--quiet", "--out", str(tmp_path / "plain")]
+    assert main(plain) == 5  # what one call sets, the next of the same process has not
+    assert "network" not in (tmp_path / "plain/cases/tiny-seed-1.toml").read_text()
 
 
 def test_a_sweep_by_the_fast_model_varies_no_model(swept, tmp_path):
