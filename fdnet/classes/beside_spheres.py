@@ -49,13 +49,8 @@ CHANGED = 0.2
 
 
 class Passed(NamedTuple):
-    """The fluid that has passed since the update before.
-
-    Attributes:
-        before: m3 in all, up to that update.
-        now: m3 in all.
-        velocity: m/s, superficial, of the fluid itself.
-    """
+    """The fluid that has passed, m3 in all, up to the update `before` and `now`; its superficial
+    `velocity`, m/s."""
 
     before: float
     now: float
@@ -63,13 +58,8 @@ class Passed(NamedTuple):
 
 
 class Stands(NamedTuple):
-    """The spheres that stand.
-
-    Attributes:
-        factor: (T, 2) share of its clean conductance that they leave to each side.
-        in_pores: (P,) m3 in each pore, over the share of the pore inside the box.
-        cake: m3 before the face.
-    """
+    """The spheres that stand: the share (T, 2) that they leave of each side, their m3 in each pore
+    (P,) over the share of the pore inside the box, and m3 before the face."""
 
     factor: Array
     in_pores: Array
@@ -77,13 +67,8 @@ class Stands(NamedTuple):
 
 
 class Narrowed(NamedTuple):
-    """What solids finer than the spheres do.
-
-    Attributes:
-        kept: (T, 2) share of its clean conductance that all leave to a side.
-        volume: (G,) m3 at rest in groups of pores.
-        grown: whether the network must be solved anew for it.
-    """
+    """What all solids leave (T, 2) of each side, m3 of finer ones at rest in groups of pores (G,),
+    and whether the network must be solved anew for them."""
 
     kept: Array
     volume: Array
@@ -188,7 +173,8 @@ class FinerClasses:
     @property
     def own(self) -> SizeClasses:
         """The classes (C) without the spheres."""
-        return without_last(self.classes)
+        names = [one.name for one in fields(SizeClasses)]
+        return SizeClasses(**{name: getattr(self.classes, name)[:-1] for name in names})
 
     @property
     def resistance(self) -> float:
@@ -229,11 +215,6 @@ class FinerClasses:
 
 HELD = ("in_pores", "attached", "in_throats")
 """The solids at rest in the specimen."""
-
-
-def without_last(classes: SizeClasses) -> SizeClasses:
-    """The classes but for the last one."""
-    return SizeClasses(**{one.name: getattr(classes, one.name)[:-1] for one in fields(classes)})
 
 
 def finer_classes(

@@ -1,21 +1,6 @@
 """What holds a class back: straining, bridging, and what carries it to the surface of grains.
 
-**Straining.** The largest sphere that passes between three grains is the circle that touches the
-three discs which they show in the plane of their centres: twice `Network.throat_radius` is exact.
-A class spans a range of diameters; the share of it that is wider than the passage is strained.
-
-**Bridging.** A throat wider than a fine stops it by chance, for others arrive with it or stand
-there. The chance per arrival is measured (`BRIDGED`).
-
-**Attachment.** Fluid brings a fine to grains by diffusion, interception and settling with the
-single-collector efficiency of Tufenkji and Elimelech (2004, Environ. Sci. Technol. 38, 529-536),
-and a share alpha of the contacts sticks, 0 where the case names none. A bed of grains d_c takes
-(Yao, Habibian and O'Melia 1971, Environ. Sci. Technol. 5, 1105-1112)
-
-    dc/dx = -lambda c,   lambda = 3 (1 - porosity) / (2 d_c) alpha eta,
-
-less what already sticks: a surface takes `JAMMED` of a monolayer, and lambda falls in proportion
-(Johnson and Elimelech 1995, Langmuir 11, 801-812).
+The laws, their sources and ranges are on docs/theory/size_classes.md.
 """
 
 import math
@@ -30,8 +15,7 @@ BOLTZMANN, GRAVITY = 1.380649e-23, 9.81
 TEMPERATURE, HAMAKER = 293.0, 1e-20
 """K, and J of a mineral on quartz in water, which Tufenkji and Elimelech take."""
 JAMMED = 0.546
-"""Cover of a surface by discs that land at random, when none fits any more (Hinrichsen, Feder and
-Jossang 1986, J. Stat. Phys. 44, 793)."""
+"""Cover by discs that land at random, when none fits any more (Hinrichsen et al. 1986)."""
 TIGHT = 0.1547
 """Largest sphere that passes three equal touching spheres, over their diameter: 2 / sqrt(3) - 1.
 A bed of spheres holds what is larger than this of its own."""
@@ -119,11 +103,8 @@ def bridging_chance(ratio: Array) -> Array:
 
     0 from 1 on, where `wider_share` holds all.
     """
-    return np.where(
-        ratio < 1.0,
-        np.interp(ratio, [one for one, _ in BRIDGED], [one for _, one in BRIDGED]),
-        0.0,
-    )
+    at, chance = zip(*BRIDGED, strict=True)
+    return np.where(ratio < 1.0, np.interp(ratio, at, chance), 0.0)
 
 
 # ------------------------------------------------------------------------------------------------
@@ -155,8 +136,8 @@ def collector_efficiency(diameter: Array, density: Array, bed: Bed) -> Array:
     eta = 2.4 A_s^(1/3) N_R^-0.081 N_Pe^-0.715 N_vdW^0.052 + 0.55 A_s N_R^1.675 N_A^0.125
         + 0.22 N_R^-0.24 N_G^1.11 N_vdW^0.053
 
-    (Tufenkji and Elimelech 2004), for N_R up to 0.02 and N_Pe from 1e2 on. Fines lighter than the
-    fluid do not settle.
+    (Tufenkji and Elimelech 2004, Environ. Sci. Technol. 38, 529), for N_R up to 0.02 and N_Pe from
+    1e2 on. Fines lighter than the fluid do not settle.
     """
     gamma = (1.0 - bed.porosity) ** (1.0 / 3.0)
     happel = 2.0 * (1.0 - gamma**5) / (2.0 - 3.0 * gamma + 3.0 * gamma**5 - 2.0 * gamma**6)
@@ -175,7 +156,7 @@ def collector_efficiency(diameter: Array, density: Array, bed: Bed) -> Array:
 
 
 def filter_coefficient(classes: SizeClasses, bed: Bed, sticking: float) -> Array:
-    """lambda (C,) 1/m of each class on clean grains."""
+    """lambda (C,) 1/m of each class on clean grains (Yao, Habibian and O'Melia 1971)."""
     if sticking == 0.0 or bed.velocity <= 0.0:
         return np.zeros(len(classes.diameter))
     eta = collector_efficiency(classes.diameter, classes.density, bed)
@@ -185,7 +166,7 @@ def filter_coefficient(classes: SizeClasses, bed: Bed, sticking: float) -> Array
 def covered(deposit: Array, classes: SizeClasses, surface: Array) -> Array:
     """Cover (N,) over `JAMMED` of surfaces (N,) m2 by attached solids (N, C) m3, at most 1.
 
-    A fine covers its own section: 3 / (2 d) for each volume.
+    A fine covers its own section, 3 / (2 d) for each volume (Johnson and Elimelech 1995).
     """
     section = deposit @ (1.5 / classes.diameter)
     full = JAMMED * np.where(surface > 0, surface, math.inf)

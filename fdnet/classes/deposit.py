@@ -131,28 +131,19 @@ class Deposits:
         return np.asarray((self.supplied - found) / np.maximum(self.supplied, 1e-300))
 
     @property
-    def inside(self) -> tuple[Array, Array, Array, Array]:
-        """What is in the specimen, by pore or throat."""
-        return self.carried, self.in_pores, self.attached, self.in_throats
-
-    @property
     def inside_by_class(self) -> Array:
         """(C,) m3 in the specimen."""
-        return np.sum([one.sum(axis=0) for one in self.inside], axis=0)
+        parts = (self.carried, self.in_pores, self.attached, self.in_throats)
+        return np.sum([one.sum(axis=0) for one in parts], axis=0)
 
 
 def no_solids(sieve: Sieve, classes: SizeClasses) -> Deposits:
     """A specimen that no mud has reached."""
-    pores, count = len(sieve.void), len(classes.diameter)
-    nothing = np.zeros((pores, count))
+    count, pores = len(classes.diameter), ("carried", "in_pores", "attached")
     return Deposits(
-        carried=nothing,
-        in_pores=nothing.copy(),
-        attached=nothing.copy(),
+        **{name: np.zeros((len(sieve.void), count)) for name in pores},
         in_throats=np.zeros((len(sieve.ends), count)),
-        cake=np.zeros(count),
-        passed=np.zeros(count),
-        supplied=np.zeros(count),
+        **{name: np.zeros(count) for name in ("cake", "passed", "supplied")},
     )
 
 
@@ -172,20 +163,13 @@ WEDGES = 1.3
 """A fine up to so many passages wide sits in the throat that holds it, a wider one before it."""
 
 
-def wedged(solids: Deposits, classes: SizeClasses) -> Array:
-    """Number (T,) of fines in each throat, at most 1."""
-    return np.minimum(solids.in_throats @ (1.0 / classes.volume), 1.0)
-
-
 class Loads(NamedTuple):
-    """What the deposit takes of pores (N)."""
+    """What the deposit takes of pores (N): the share of the void, this over that of a full pore,
+    and its Sauter diameter, m, 0 where there is none."""
 
     share: Array
-    """(N,) of the void."""
     filled: Array
-    """(N,) over the share of a full pore."""
     diameter: Array
-    """(N,) m, Sauter mean; 0 where there is none."""
 
 
 def loads_of(
@@ -237,11 +221,6 @@ def bed_holds(size: Array, classes: SizeClasses) -> Array:
     return np.where(size[:, None] > 0, wider_share(classes, TIGHT * size), 0.0)
 
 
-def full_share(fill: Array) -> Array:
-    """How far pores act as beds (N,): 0 up to a filled share of `FULL`, 1 from 1 on."""
-    return np.clip((fill - FULL) / (1.0 - FULL), 0.0, 1.0)
-
-
 # ------------------------------------------------------------------------------------------------
 # What each link holds back, and where that goes.
 
@@ -274,7 +253,8 @@ def holding(
     """What holds back what, with the deposit as it is; `filtering` (C,) 1/m is of clean grains."""
     loads, throat = loads_of(sieve, solids, classes), streams.link
     holds = bed_holds(loads.diameter, classes)
-    full = full_share(loads.filled)[:, None] * holds
+    # 0 up to a filled share of FULL, 1 in a full pore
+    full = np.clip((loads.filled - FULL) / (1.0 - FULL), 0.0, 1.0)[:, None] * holds
     one, other = streams.source, streams.target
     void = np.maximum(sieve.void, 1e-30)
     near = (loads.share * void)[one] + (loads.share * void)[other]
@@ -299,15 +279,9 @@ NONE = 1e-3
 
 
 def _admitted(sieve: Sieve, solids: Deposits, classes: SizeClasses, full: Array) -> Array:
-    covers = min(1.0, cake_layers(sieve, solids, classes))
-    size = bed_diameter(solids.cake[None], classes)
-    return (1.0 - full) * (1.0 - covers * bed_holds(size, classes))
-
-
-def cake_layers(sieve: Sieve, solids: Deposits, classes: SizeClasses) -> float:
-    """Thickness of the cake in its own Sauter diameters."""
-    size = float(bed_diameter(solids.cake, classes))
-    return thickness_of_cake(sieve, solids) / size if size > 0 else 0.0
+    size, own = (bed_diameter(one, classes) for one in (solids.cake[None], solids.cake))
+    layers = thickness_of_cake(sieve, solids) / float(own) if own > 0 else 0.0
+    return (1.0 - full) * (1.0 - min(1.0, layers) * bed_holds(size, classes))
 
 
 def thickness_of_cake(sieve: Sieve, solids: Deposits) -> float:
@@ -339,7 +313,9 @@ def advanced(
     count = len(sieve.void)
     sticks = np.divide(what.stuck, what.held, out=np.zeros_like(what.held), where=what.held > 0)
     stuck = carried.held * sticks
-    rest, room = carried.held - stuck, 1.0 - wedged(solids, classes)[streams.link]
+    rest = carried.held - stuck
+    wedged = np.minimum(solids.in_throats @ (1.0 / classes.volume), 1.0)
+    room = 1.0 - wedged[streams.link]
     in_pores, attached = solids.in_pores.copy(), solids.attached.copy()
     in_throats, volume = solids.in_throats.copy(), classes.volume
     passage = sieve.passage[streams.link]

@@ -41,13 +41,13 @@ MOST_STEPS = 5000
 
 
 class PackState(NamedTuple):
-    """The flow through the pack as its deposit left it."""
+    """The flow through the pack as its deposit left it; `energy` (T,) is the share that each
+    throat spends."""
 
     streams: Streams
     energy: Array
-    """(T,) share of each throat in the energy spent."""
     k_over_k0: float
-    flow: Flow | None = None
+    flow: Flow
 
 
 def flows_through(network: Network, sieve: Sieve, clean: Array) -> "PackStateOf":
@@ -146,16 +146,14 @@ class ClassInvasion:
         kept: (T, 2) share of its conductance that each side of a throat keeps.
         rows: one a step: time, rate, filtrate, solids, cake.
         by_class: (S, 3, C) m3 inside, passed and in the cake at each of these steps.
-        stop_reason: "plugged", "duration", "supply_exhausted" or "cap".
-        state: the flow at the end.
+        stop_reason: "plugged", "duration", "supply_exhausted" or "cap"; "" where it is not asked.
     """
 
     solids: Deposits
     kept: Array
     rows: tuple[Mapping[str, float], ...]
     by_class: Array
-    stop_reason: str
-    state: PackState
+    stop_reason: str = ""
 
 
 def velocity_in(
@@ -239,7 +237,6 @@ def invade_classes(
         rows=tuple(rows),
         by_class=np.array(by_class),
         stop_reason=reason or "cap",
-        state=state,
     )
 
 

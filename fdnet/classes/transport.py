@@ -1,15 +1,8 @@
 """Size classes carried upwind through the pores, with exact balance.
 
-Steady flow through a network is potential flow: a link leads from a pore of higher pressure to one
-of lower pressure. So the pores in the order of falling pressure make the upwind system lower
-triangular, and one sweep solves it for all classes. With the void V of a pore, the volume w of
-fluid that each link carries in a step, and the share h that a link holds back of a class,
-
-    (V + sum of w out) c = m + sum of w in (1 - h) c_upstream + w fed c_fed
-
-with the solids m that were in the pore. It is the implicit Euler step of the balance of the class,
-so no step is too long for it, no concentration falls below 0, and what is fed is in pores, held or
-passed, to rounding.
+A link leads from a pore of higher pressure to one of lower pressure, so in the order of falling
+pressure the upwind system is lower triangular, and one sweep solves it for all classes: the
+implicit Euler step on docs/theory/size_classes.md.
 """
 
 from dataclasses import dataclass

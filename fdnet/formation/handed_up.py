@@ -31,8 +31,7 @@ from fdnet.run.folder import MANIFEST, is_run_folder
 from fdnet.spheres.snapshot import Array
 
 FEWEST, LEAST_LOSS, MISFIT, DRAWS, PLACES = 30, 0.02, 0.1, 24, 800
-"""Fines that a fit needs, loss of a section that gives a damage, distance of two distributions
-that is said, draws from a fit's errors where there are no seeds, and places of a fit."""
+"""Fines that a fit needs, least loss that gives a damage, misfit that is said, draws, places."""
 _BOUNDS = ((0.0, 18.0), (-4.0, 8.0))
 
 

@@ -63,14 +63,8 @@ def steep_grid(length: float, cells: int, scale: float) -> Array:
 
 
 class FineClass(NamedTuple):
-    """Fines that are filtered alike.
-
-    Attributes:
-        name: of the class.
-        concentration: volume of its fines over volume of mud.
-        rate: 1/m, filtration coefficient of clean rock.
-        growth: relative growth of the rate with the deposit s of all classes; below 0 it falls.
-    """
+    """Fines that are filtered alike: their volume over that of mud, the filtration coefficient
+    1/m of clean rock, and its relative growth with the deposit of all classes."""
 
     name: str
     concentration: float
@@ -85,8 +79,7 @@ class Medium:
     Attributes:
         porosity, permeability: of sound rock.
         damage, power: a deposit s leaves permeability / (1 + damage s)^power.
-        viscosity: Pa s.
-        mud: its classes.
+        viscosity, mud: of the fluid, Pa s, and its classes.
         closing: deposit of the face at which it closes; 0: at once, infinite: never.
         cake_porosity, cake_permeability: of what the solids build on the closed face; without a
             permeability nothing is known from then on.
@@ -133,11 +126,9 @@ class Flood(NamedTuple):
 def cake_skin(shape: str, thickness: float, well: float) -> float:
     """Skin of a cake as permeable as the formation; times k / k_c it is that of the cake.
 
-    Args:
-        shape: "linear": h / r; "radial": ln(sqrt(r^2 + 2 r h) / r), "linrad": ln((r + h) / r),
-            as OPM Flow has them; "inward": ln(r / sqrt(r^2 - 2 r h)), a cake inside the well.
-        thickness: h, m: volume of the cake over the area of the face.
-        well: r, m.
+    For its thickness h m (volume over the face) at a well of radius r m: "linear" h / r, "radial"
+    ln(sqrt(r^2 + 2 r h) / r), "linrad" ln((r + h) / r) as OPM Flow has them, and "inward"
+    ln(r / sqrt(r^2 - 2 r h)), a cake inside the well.
     """
     ratio = thickness / well
     if shape in ("linear", "linrad"):
@@ -150,18 +141,18 @@ def cake_skin(shape: str, thickness: float, well: float) -> float:
 def damage_skin(column: Column, loss: Array) -> float:
     """Integral of (k0 / k - 1) dr / r over the cells, `loss` being k0 / k (J,)."""
     over_r = np.diff(column.reach(column.edges)) * column.area / column.well
-    return float(np.sum((loss - 1.0) * over_r))
+    return float((loss - 1.0) @ over_r)
 
 
 class Filled(NamedTuple):
     """Where the fines of C classes are, in J cells.
 
     Attributes:
-        suspended, deposit: (C, J) volume of fines over that of fluid, and over bulk volume.
-        held: (C, J) part of the deposit that back-flow cannot take.
+        suspended, deposit, held: (C, J) volume of fines over that of fluid, over bulk volume, and
+            the part of this that back-flow cannot take.
         face: deposit of all classes at the face itself.
-        cake, supplied, passed, returned: (C,) m3 of fines in the cake, supplied with the mud, out
-            of the far end, out of the face.
+        cake, supplied, passed, returned: (C,) m3 in the cake, with the mud, out of the far end and
+            out of the face.
     """
 
     suspended: Array

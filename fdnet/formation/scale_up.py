@@ -67,12 +67,6 @@ def core_flood(
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
-
-    Examples:
-        >>> import fdnet
-        >>> core = fdnet.core_flood("runs/quick", length=0.076, rate=1.7e-8)
-        >>> 0 < core["k_over_k0"] < 1
-        True
     """
     if (rate is None) == (pressure is None):
         raise CaseError("a core takes a rate or a pressure; give one of --rate and --pressure")
@@ -134,8 +128,8 @@ def well_invasion(
         source: a run, its folder, or the folder of an ensemble.
         hours: that the mud stands.
         height: m, of the well.
-        pressure: Pa, overbalance; that of the case where it is not given.
-        radius: m, of the well; that of the case, or 108 mm.
+        pressure: Pa, overbalance; without it that of the case.
+        radius: m, of the well; without it that of the case, or 108 mm.
         cake: as of `core_flood`.
 
     Returns:
@@ -145,11 +139,6 @@ def well_invasion(
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
-
-    Examples:
-        >>> import fdnet
-        >>> fdnet.well_invasion("runs/quick", hours=12)["skin"] > 0
-        True
     """
     _above_zero(hours=hours, height=height, pressure=pressure, radius=radius)
 

@@ -6,7 +6,7 @@ each, or one for several of them where there would be more than `MOST_ROWS`.
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,6 +18,7 @@ from fdnet.case.tables import InvasionChoices
 from fdnet.classes.capture import SizeClasses, mud_classes
 from fdnet.classes.deposit import PACKED, Deposits, Sieve, sieve_of, thickness_of_cake
 from fdnet.classes.invasion import (
+    ClassInvasion,
     Course,
     PackStateOf,
     bed_of,
@@ -44,7 +45,7 @@ from fdnet.network.flow.sections import (
 from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.network import Network, build_network
 from fdnet.report.tables import write_rows
-from fdnet.run.finished import FinishedRun
+from fdnet.run.finished import HISTORY_COLUMNS, FinishedRun
 from fdnet.run.fluid import FLOW_COLUMNS
 from fdnet.run.folder import RECORD_FORMAT, digests_of
 from fdnet.run.records import FinishedInvasion, finer_file
@@ -156,15 +157,12 @@ def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) ->
     end = invade_classes(model.sieve, model.classes, model.course, model.flow)
     folder.mkdir(parents=True, exist_ok=True)
     arrays = {one.name: getattr(end.solids, one.name) for one in fields(end.solids)}
-    rows = {key: np.array([row[key] for row in end.rows]) for key in end.rows[0]}
-    arrays |= {"kept": end.kept, "by_class": end.by_class} | {
-        f"row_{key}": one for key, one in rows.items()
-    }
+    arrays |= {f"row_{key}": np.array([row[key] for row in end.rows]) for key in end.rows[0]}
+    arrays |= {"kept": end.kept, "by_class": end.by_class}
     with replacing(folder / STATE) as part:
         np.savez_compressed(part, **arrays)
     counts = model.counted(end.by_class[-1])
     write_rows(folder / HISTORY, history_of(model.classes, end.by_class, counts.per_row))
-    missing = float(np.abs(end.solids.missing).max())
     return {
         "format": RECORD_FORMAT,
         "digest": case.digest("invade"),
@@ -174,7 +172,7 @@ def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) ->
         "steps": len(end.rows) - 1,
         "dt_s": 0.0,
         "supplied": int(counts.supplied.sum()),
-        "mass_missing": missing,
+        "mass_missing": float(np.abs(end.solids.missing).max()),
         "warnings": [explained(one) for one in all_is_cake(model)],
         "ranks": 1,
         "files": digests_of(folder, [HISTORY, STATE]),
@@ -196,35 +194,25 @@ def all_is_cake(model: ClassModel) -> Iterator[str]:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Kept:
-    """What invade/classes.npz holds.
-
-    Attributes:
-        solids: where they are.
-        kept: (T, 2) share of its conductance that each side of a throat keeps.
-        by_class: (S, 3, C) m3 inside, passed and in the cake at each step.
-        rows: the history, one a step.
-    """
-
-    solids: Deposits
-    kept: Array
-    by_class: Array
-    rows: tuple[dict[str, float], ...]
-
-
-def read_classes(path: Path, last: Mapping[str, float] | None = None) -> Kept:
+def read_classes(path: Path, last: Mapping[str, float] | None = None) -> ClassInvasion:
     """The end of an invasion; with `last`, the row of its last update, one beside spheres."""
     with np.load(path) as data:
         solids = Deposits(**{one.name: data[one.name] for one in fields(Deposits)})
         if last is not None:
             volumes = np.array([[solids.inside_by_class, solids.passed, solids.cake]])
-            return Kept(solids=solids, kept=data["kept"], by_class=volumes, rows=(dict(last),))
+            return ClassInvasion(
+                solids=solids, kept=data["kept"], by_class=volumes, rows=(dict(last),)
+            )
         columns = {name[4:]: data[name].tolist() for name in data.files if name[:4] == "row_"}
-        rows = [
-            dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)
-        ]
-        return Kept(solids=solids, kept=data["kept"], by_class=data["by_class"], rows=tuple(rows))
+        rows = tuple(rows_of(columns))
+        return ClassInvasion(
+            solids=solids, kept=data["kept"], by_class=data["by_class"], rows=rows
+        )
+
+
+def rows_of(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
+    """The rows of a table that is given by its columns."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 # ------------------------------------------------------------------------------------------------
@@ -255,15 +243,14 @@ class Counts:
 
 def history_of(classes: SizeClasses, by_class: Array, per_row: Array) -> list[dict[str, int]]:
     """The counts of each step, as the deck of an invasion writes them."""
-    counts = np.rint(by_class / classes.volume / per_row).astype(int).sum(axis=2).tolist()
-    return [
-        {"chunk": i + 1, "step": i, "upstream": cake, "invaded": inside, "passed": passed}
-        for i, (inside, passed, cake) in enumerate(counts)
-    ]
+    counts = np.rint(by_class / classes.volume / per_row).astype(int).sum(axis=2)
+    names, step = ("invaded", "passed", "upstream"), np.arange(len(counts))
+    columns = {"chunk": step + 1, "step": step} | dict(zip(names, counts.T, strict=True))
+    return rows_of({name: columns[name].tolist() for name in HISTORY_COLUMNS})
 
 
 def spheres_at_the_end(
-    case: InvasionCase, model: ClassModel, kept: Kept, counts: Counts
+    case: InvasionCase, model: ClassModel, kept: ClassInvasion, counts: Counts
 ) -> Snapshot:
     """Fines at places in the pores and throats that hold them, and the cake before the face."""
     rng, solids = np.random.default_rng(case.seed), kept.solids
@@ -381,7 +368,7 @@ def rested_classes(run: FinishedRun, case: InvasionCase) -> list[Rested]:
 
 
 def analysed_classes(
-    model: ClassModel, kept: Kept, base: "Analysis", spheres: Snapshot
+    model: ClassModel, kept: ClassInvasion, base: "Analysis", spheres: Snapshot
 ) -> "Analysis":
     """The analysis with the deposit of the classes; `base` is that without them.
 
@@ -463,7 +450,7 @@ def analysed_classes(
             fines_count=frozen(np.histogram(depth, thin)[0]),
         ),
         invaded_count=len(depth),
-        invaded_volume=base.invaded_volume + float(sum(one.sum() for one in kept.solids.inside)),
+        invaded_volume=base.invaded_volume + float(kept.solids.inside_by_class.sum()),
         invasion_depth=float(depth.max(initial=0.0)),
         invasion_depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
         cake_thickness=base.cake_thickness + cake,
@@ -492,7 +479,11 @@ def _share(filled: tuple[Array, Array, Array], edges: Array, sieve: Sieve) -> Ar
 
 
 def _occupancy(
-    model: ClassModel, kept: Kept, base: Occupancy | None, spheres: Snapshot, factor: Array
+    model: ClassModel,
+    kept: ClassInvasion,
+    base: Occupancy | None,
+    spheres: Snapshot,
+    factor: Array,
 ) -> Occupancy:
     """What the solids take of throats and pores; a throat with less than 1 % left is blocked."""
     network, sieve, solids = model.network, model.sieve, kept.solids
@@ -538,7 +529,7 @@ def finished_classes(
     scales: InvasionScales,
     grains: Snapshot,
     folder: Path,
-) -> tuple[FinishedInvasion, ClassModel, Kept]:
+) -> tuple[FinishedInvasion, ClassModel, ClassInvasion]:
     """The invasion in `folder`, with its model and what the classes left."""
     model, kept = class_model(case, scales, grains), read_classes(folder / STATE)
     counts = model.counted(kept.by_class[-1])
@@ -553,19 +544,18 @@ def finished_classes(
         most_crossed=0,
         quiet=0,
     )
-    rows = []
-    for row, own in zip(
-        kept.rows, history_of(model.classes, kept.by_class, counts.per_row), strict=True
-    ):
-        number = {f"{name}_count": own[name] for name in ("invaded", "passed", "upstream")}
-        both = {"time_s": row["time_s"], "physical_time_s": row["time_s"]}
-        rows.append(
-            both
-            | {"supplied_count": sum(number.values())}
-            | number
-            | {"step": own["step"]}
-            | {name: row[name] for name in FLOW_COLUMNS if name in row}
-        )
+    numbers = history_of(model.classes, kept.by_class, counts.per_row)
+    rows = [
+        {
+            "time_s": row["time_s"],
+            "physical_time_s": row["time_s"],
+            "supplied_count": own["invaded"] + own["passed"] + own["upstream"],
+            **{f"{name}_count": own[name] for name in ("invaded", "passed", "upstream")},
+            "step": own["step"],
+            **{name: row[name] for name in FLOW_COLUMNS if name in row},
+        }
+        for row, own in zip(kept.rows, numbers, strict=True)
+    ]
     done = FinishedInvasion(
         case=case,
         scales=scales,
@@ -576,38 +566,30 @@ def finished_classes(
     return done, model, kept
 
 
-def class_summary(case: InvasionCase, model: ClassModel, kept: Kept) -> dict[str, Any]:
+def class_summary(case: InvasionCase, model: ClassModel, kept: ClassInvasion) -> dict[str, Any]:
     """The keys that the fast model adds to summary.json."""
-    solids, last = kept.solids, kept.rows[-1]
+    solids, last, own = kept.solids, kept.rows[-1], model.classes
     counts = model.counted(kept.by_class[-1])
-    inside = solids.inside_by_class
-    permeability, drop = cake_permeability(case), last["pressure_cake_Pa"]
-    api = None
-    if permeability is not None:
+    given, drop, api = model.course.cake_permeability, last["pressure_cake_Pa"], None
+    if given is not None:
         viscosity, share = case.fluid.viscosity_Pa_s, case.fines.volume_fraction
-        api = 1e6 * api_filtrate(permeability, viscosity=viscosity, solids=share, porosity=PACKED)
-    classes = model.classes
-    rows = [
-        {
-            "from_m": float(classes.low[i]),
-            "to_m": float(classes.high[i]),
-            "diameter_m": float(classes.diameter[i]),
-            "concentration": float(classes.concentration[i]),
-            "supplied_m3": float(solids.supplied[i]),
-            "inside_m3": float(inside[i]),
-            "passed_m3": float(solids.passed[i]),
-            "cake_m3": float(solids.cake[i]),
-            "fines_per_row": int(counts.per_row[i]),
-        }
-        for i in range(len(classes.diameter))
-    ]
-    resistance = cake_resistance(
-        model.course.cake_permeability, model.sieve, solids, model.classes
-    )
+        api = 1e6 * api_filtrate(given, viscosity=viscosity, solids=share, porosity=PACKED)
+    columns = {
+        "from_m": own.low,
+        "to_m": own.high,
+        "diameter_m": own.diameter,
+        "concentration": own.concentration,
+        "supplied_m3": solids.supplied,
+        "inside_m3": solids.inside_by_class,
+        "passed_m3": solids.passed,
+        "cake_m3": solids.cake,
+        "fines_per_row": counts.per_row.astype(int),
+    }
+    resistance = cake_resistance(given, model.sieve, solids, own)
     common = {
         "method": "network",
         "method_error": METHOD_ERROR,
-        "classes": rows,
+        "classes": rows_of({name: one.tolist() for name, one in columns.items()}),
         "mass_missing": float(np.abs(solids.missing).max()),
         "rate_over_initial": last["rate_over_initial"],
         "filtrate_m3": last["filtrate_m3"],
@@ -617,26 +599,24 @@ def class_summary(case: InvasionCase, model: ClassModel, kept: Kept) -> dict[str
         return common | {"method": "both", "cake_of_classes_1_m": resistance}
     return common | {
         "cake_resistance_share": drop / max(drop + last["pressure_pack_Pa"], 1e-300),
-        "cake": _cake(case, model, kept, counts, resistance),
+        "cake": _cake(model, kept, counts, resistance),
     }
 
 
 def _cake(
-    case: InvasionCase, model: ClassModel, kept: Kept, counts: Counts, resistance: float
+    model: ClassModel, kept: ClassInvasion, counts: Counts, resistance: float
 ) -> dict[str, Any] | None:
     """The cake as the summary of any run has it; None where no solids stand before the face."""
-    sieve, solids = model.sieve, kept.solids
     if not resistance:
         return None
-    thickness = thickness_of_cake(sieve, solids)
-    given = cake_permeability(case) is not None
+    thickness = thickness_of_cake(model.sieve, kept.solids)
     return {
         "fines": int(counts.upstream.sum()),
         "thickness_m": thickness,
         "packed_thickness_m": thickness,
         "porosity": PACKED,
         "k_m2": thickness / resistance,
-        "law": "given" if given else "carman-kozeny",
+        "law": "given" if model.course.cake_permeability else "carman-kozeny",
         "resistance_1_m": resistance,
         "resistance_pack_1_m": model.course.resistance / max(kept.rows[-1]["k_over_k0"], 1e-300),
         "no_cake_yet": "",

@@ -24,7 +24,7 @@ from fdnet.classes.invasion import ClassInvasion, invade_classes
 from fdnet.files import path_option
 from fdnet.network.flow.sections import FIRST, inplace_permeability
 from fdnet.report.tables import write_rows
-from fdnet.run.by_classes import Kept, class_model, spheres_at_the_end
+from fdnet.run.by_classes import class_model, spheres_at_the_end
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.scales.scales import invasion_scales
 from validation.benchmark import grains_of
@@ -53,13 +53,10 @@ def both(run: FinishedRun) -> dict[str, Any]:
     model = class_model(case, invasion_scales(case), run.spheres("initial"))
     end = invade_classes(model.sieve, model.classes, model.course, model.flow)
     seconds = time.process_time() - start
-    kept = Kept(solids=end.solids, kept=end.kept, by_class=end.by_class, rows=())
     counts = model.counted(end.by_class[-1])
-    x = spheres_at_the_end(case, model, kept, counts).position[:, 0]
+    x = spheres_at_the_end(case, model, end, counts).position[:, 0]
     edges = np.array([0.0, min(FIRST, case.size_m[0])])
-    clean, flow = model.flow(np.ones_like(end.kept)).flow, end.state.flow
-    assert clean is not None
-    assert flow is not None
+    clean, flow = model.flow(np.ones_like(end.kept)).flow, model.flow(end.kept).flow
     intact = inplace_permeability(model.network, clean, edges, model.sieve.halves)
     damaged = inplace_permeability(model.network, flow, edges, model.sieve.halves / end.kept)
     passed, number = int(counts.passed.sum()), int(counts.invaded.sum())
