@@ -11,6 +11,7 @@ import os
 import shlex
 import signal
 import sys
+import threading
 from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
@@ -43,6 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     debug = "--debug" in given
     whole = arguments is None
     _listen_for_stops()
+    if whole:
+        sys.unraisablehook = _stop_again
     try:
         options = _parsed(given)
         options.command_line = shlex.join(["fdnet", *given])
@@ -98,6 +101,20 @@ def _listen_for_stops() -> None:
 def _interrupt(number: int, *_: Any) -> NoReturn:
     _SIGNALS.append(number)
     raise KeyboardInterrupt
+
+
+def _stop_again(lost: Any) -> None:
+    """Sends a stop once more that arrived where nothing can be raised, as in a call-back.
+
+    Other such errors are shown as Python shows them, unless a stop has made them.
+    """
+    if issubclass(lost.exc_type, KeyboardInterrupt):
+        main_thread = (threading.main_thread().ident, signal.SIGINT)
+        again = threading.Timer(0.2, signal.pthread_kill, main_thread)
+        again.daemon = True
+        again.start()
+    elif not _SIGNALS:
+        sys.__unraisablehook__(lost)
 
 
 def _parsed(given: Sequence[str]) -> argparse.Namespace:

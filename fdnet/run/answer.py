@@ -139,15 +139,10 @@ def layers_in_series(layers: Sequence[tuple[float, float]]) -> float:
 
 
 def hawkins(ratio: float, *, well: float, damaged: float) -> float:
-    """s = (k / k_d - 1) ln(r_d / r_w) (Hawkins 1956, Trans. AIME 207, 356-357).
+    """Skin s = (k / k_d - 1) ln(r_d / r_w) (Hawkins 1956, Trans. AIME 207, 356-357).
 
-    Args:
-        ratio: k_d / k, permeability of the damaged zone over that of the formation.
-        well: radius of the well, m.
-        damaged: radius to which the damage reaches, m.
-
-    Returns:
-        The skin factor; infinite where the ratio is 0.
+    The `ratio` is k_d / k, of the damaged zone over the formation; radii r_w of the `well` and r_d
+    to which it is `damaged` in m. The skin is infinite where the ratio is 0.
     """
     return (1.0 / ratio - 1.0) * math.log(damaged / well) if ratio > 0 else math.inf
 
@@ -215,26 +210,18 @@ def run_shows(summary: Mapping[str, Any]) -> str:
 
 
 def rules_of(
-    shows: str,
+    shows: str,  # what `run_shows` gives
     *,
-    fines: Mapping[str, float],
-    throat_median: float,
-    throat_largest: float,
-    grain_d15: float,
-    concentration: float,
+    fines: Mapping[str, float],  # D50, D85 and D90 of the fines by name, m, by volume
+    throat_median: float,  # median diameter of the open throats, m, by number
+    throat_largest: float,  # diameter that 99 % of the open ones are narrower than, m
+    grain_d15: float,  # D15 of the grains, m
+    concentration: float,  # share of solids in the mud, by volume
 ) -> list[dict[str, Any]]:
-    """What every rule says, and whether it agrees with what the run `shows` (`run_shows`).
+    """What every rule says, and whether it agrees with what the run `shows`.
 
     `value` is of the case and dimensionless, `limit` of the rule; a rule `says` "bridges",
     "passes" or "between", and `agrees` is None where rule or run is undecided.
-
-    Args:
-        shows: what `run_shows` gives.
-        fines: D50, D85 and D90 of the fines by name, m, by volume.
-        throat_median: median diameter of the open throats, m, by number.
-        throat_largest: diameter that 99 % of the open ones are narrower than, m.
-        grain_d15: D15 of the grains, m.
-        concentration: share of solids in the mud, by volume.
     """
     ratio = fines["D50"] / throat_median
     abrams = ratio >= ABRAMS_SIZE and concentration >= ABRAMS_SHARE

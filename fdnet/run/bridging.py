@@ -68,13 +68,8 @@ def ratio_rows(
     """The classes of ratio that hold throats, as bridging.csv names their values.
 
     Of the open throats between grains that conduct, down to the depth above which 95 % of the
-    fines lie. The ratio is that of the mean fine in the throat, or of all where it holds none.
-
-    Args:
-        analysis: of the damaged specimen.
-        entered: number of fines that came in, those that passed too.
-        fine_diameter: mean of the fines, m.
-        concentration: of the suspension, by volume.
+    fines lie. The ratio is that of the mean fine in the throat, or of all (`fine_diameter`, m)
+    where it holds none. Fines that passed have `entered` too; the `concentration` is by volume.
     """
     network, flow = analysis.network, analysis.flow_initial
     depth, is_open = network.throat_corner[..., 0].mean(axis=1), network.throat_radius > 0
