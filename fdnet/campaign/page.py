@@ -75,9 +75,7 @@ class Compared:
     @cached_property
     def table(self) -> "pd.DataFrame":
         """A row for each run with every number of its summary, lengths in m, k in m2."""
-        import pandas as pd
-
-        return pd.DataFrame(results.run_rows(self.comparison))
+        return results.run_table(self.comparison)
 
     @cached_property
     def band(self) -> "pd.DataFrame":
@@ -113,7 +111,8 @@ class Compared:
 def write_comparison(comparison: Comparison, limits: Mapping[str, float]) -> Compared:
     """Write table.csv, summary.json, figures and compare.html; `limits` (SI) are of targets."""
     made = Compared(comparison, limits)
-    results.write_table(comparison)
+    table = results.run_table(comparison, object).to_csv(index=False, lineterminator="\n")
+    write_text(made.path / results.TABLE, table)
     write_text(made.path / results.SUMMARY, json.dumps(made.summary, indent=1) + "\n")
     judged = [line for *_, line in made.candidates]
     text = html.page_text(

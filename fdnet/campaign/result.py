@@ -16,7 +16,6 @@ from fdnet.campaign.plan import PACKS, RUNS, Plan, label_of, read_plan_record, s
 from fdnet.case.case import Case
 from fdnet.case.units import converted, share_of
 from fdnet.errors import CaseError
-from fdnet.files import write_text
 from fdnet.report.tables import read_summary
 from fdnet.run.folder import MANIFEST, check_finished, is_run_folder, read_record
 from fdnet.run.records import processor_seconds
@@ -328,13 +327,11 @@ def depth_table(comparison: Comparison) -> "pd.DataFrame":
     return table.sort_values(["variant", "section"], ignore_index=True)
 
 
-def write_table(comparison: Comparison) -> None:
-    """Write table.csv, the `run_rows` with numbers as they are."""
+def run_table(comparison: Comparison, dtype: Any = None) -> "pd.DataFrame":
+    """The `run_rows`, with the types of their numbers or as objects."""
     import pandas as pd
 
-    table = pd.DataFrame(run_rows(comparison), dtype=object)
-    text = table.to_csv(index=False, lineterminator="\n")
-    write_text(comparison.path / TABLE, text)
+    return pd.DataFrame(run_rows(comparison), dtype=dtype)
 
 
 def summary_of(comparison: Comparison, more: Mapping[str, Any]) -> dict[str, Any]:
