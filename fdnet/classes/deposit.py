@@ -312,7 +312,7 @@ def advanced(
     )
     count = len(sieve.void)
     sticks = np.divide(what.stuck, what.held, out=np.zeros_like(what.held), where=what.held > 0)
-    stuck = carried.held * sticks
+    stuck = carried.held * np.minimum(sticks, 1.0)  # not above it by rounding
     rest = carried.held - stuck
     wedged = np.minimum(solids.in_throats @ (1.0 / classes.volume), 1.0)
     room = 1.0 - wedged[streams.link]
