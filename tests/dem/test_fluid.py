@@ -322,7 +322,7 @@ def test_what_does_not_go_with_the_network_is_refused():
         (["grains.motion=mobile"], "grains.motion: 'mobile' with drag.field 'network'"),
         ([uniform, "drag.drive=rate"], "drag.drive: 'rate' belongs to"),
         (["drag.drive=rate", "run.stop_rate=0.1"], "run.stop_rate: 0.1 needs a rate that"),
-        ([uniform, "run.stop_pore_volumes=2"], "run.stop_pore_volumes: 2 belongs to drag.field"),
+        ([uniform, "run.stop_pore_volumes=2"], "run.stop_pore_volumes: 2.0 belongs to drag"),
         (["drag.inertia=none"], "drag.inertia: 'none' belongs to drag.field 'uniform'"),
         (["drag.scheme=viscous"], "drag.scheme: 'viscous' belongs to drag.field 'uniform'"),
         (["drag.pressure_gradient=false"], "drag.pressure_gradient: False belongs to"),
