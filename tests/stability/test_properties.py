@@ -15,11 +15,10 @@ from hypothesis import strategies as st
 
 from fdnet.case.file import case_from, set_keys
 from fdnet.case.tables import AnalysisChoices
-from fdnet.errors import CaseError, DumpError, FdnetError
+from fdnet.errors import CaseError, FdnetError
 from fdnet.network.permeability import analyse
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.dump import COLUMNS, parse_dump
-from fdnet.spheres.snapshot import Kind, Snapshot
+from fdnet.spheres.snapshot import Snapshot
 from tests.network.packs import random_pack, with_fines
 
 FIXED = settings(
@@ -129,52 +128,3 @@ def test_random_packs_keep_every_promise(seed, count, solid, spread, fines, arou
         whole = getattr(analysis, name)
         series = len(parts) / sum(1 / part for part in parts) if all(parts) else 0.0
         assert series == pytest.approx(whole, rel=1e-6)
-
-
-FINITE = st.floats(allow_nan=False, allow_infinity=False)
-
-
-@st.composite
-def frames(draw: st.DrawFn) -> tuple[bytes, list[np.ndarray]]:
-    """Bytes of one to three frames as LIGGGHTS writes them, and their rows by id."""
-    text, tables = "", []
-    for step in range(draw(st.integers(1, 3))):
-        ids = draw(st.lists(st.integers(1, 10**6), min_size=0, max_size=5, unique=True))
-        rows = [
-            [one, draw(st.sampled_from(list(Kind))), *(draw(FINITE) for _ in range(7))]
-            for one in ids
-        ]
-        head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\n"
-        head += "ITEM: BOX BOUNDS ff pp pp\n"
-        head += f"-1 1\n0 0.5\n-3e-3 0\nITEM: ATOMS {COLUMNS} \n"
-        text += head + "".join(
-            f"{r[0]} {int(r[1])} " + " ".join(f"{v:.17g}" for v in r[2:]) + " \n" for r in rows
-        )
-        tables.append(np.array(sorted(rows), float).reshape(-1, 9))
-    return text.encode(), tables
-
-
-@given(frames())
-@settings(FIXED, max_examples=100)
-def test_a_written_dump_is_read_back_to_the_last_bit(written):
-    data, tables = written
-    read = list(parse_dump(data, "d"))
-    assert [frame.step for frame in read] == list(range(len(tables)))
-    assert all(
-        np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=True)
-    )
-
-
-@given(frames(), st.floats(0, 1, exclude_max=True))
-@settings(FIXED, max_examples=150)
-def test_a_dump_cut_anywhere_is_refused_or_ends_between_two_frames(written, share):
-    data, tables = written
-    cut = data[: 1 + int(share * (len(data) - 1))]
-    try:
-        read = list(parse_dump(cut, "d"))
-    except DumpError:
-        return
-    assert cut == data or data[len(cut) :].startswith(b"ITEM: TIMESTEP")
-    assert all(
-        np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=False)
-    )
