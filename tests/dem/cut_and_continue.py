@@ -48,9 +48,8 @@ def places(case: InvasionCase, chunks: int) -> dict[str, tuple[int, ...]]:
 def differences(go, case, folder: Path, *, ranks: int = 1, everywhere: bool = False) -> list[str]:
     """What differs between the uncut and continued invasions; empty when nothing does.
 
-    All are run below `folder`. One is cut at every checkpoint; `everywhere` adds one for each
-    other place. What the invasion says, all overlaps that were watched, every column of the
-    spheres at the end and the last restart are compared bit for bit.
+    One is cut at every checkpoint; `everywhere` adds one for each other place. All that they say
+    and every column of the spheres at the end are compared bit for bit.
     """
     whole, different = go(case, folder / "whole", ranks=ranks), []
     cuts = places(case, len(whole.history))

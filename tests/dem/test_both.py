@@ -16,6 +16,7 @@ from fdnet.run.pipeline import run_case
 from fdnet.scales.scales import scales_of
 
 pytestmark = pytest.mark.liggghts
+ENDS = "run.plug_rate=0.05"
 WIDE = {"D10_mm": 0.02, "D50_mm": 0.06, "D90_mm": 0.12}
 
 
@@ -132,12 +133,8 @@ def test_the_common_flow_ends_it_where_the_spheres_would_go_on(tmp_path, monkeyp
     """At `run.plug_rate` of the first rate; a case of spheres alone asks for `run.stop_rate`."""
     rows = [{"step": 5, "rate_over_initial": 0.04, "filtrate_m3": 0.0}]
     monkeypatch.setattr(checkpoint, "read_updates", lambda folder: rows)
-    ends, less = "run.plug_rate=0.05", "run.plug_rate=0.03"
-    for case, said in (
-        (mud("both", ends), "plugged"),
-        (mud("both", less), None),
-        (mud("liggghts", ends, cut=None), None),
-    ):
+    less, spheres = mud("both", "run.plug_rate=0.03"), mud("liggghts", ENDS, cut=None)
+    for case, said in ((mud("both", ENDS), "plugged"), (less, None), (spheres, None)):
         assert checkpoint.flow_says(tmp_path, case, scales_of(case), 9) == said
 
 

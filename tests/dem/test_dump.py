@@ -8,16 +8,12 @@ import pytest
 from fdnet.errors import DumpError
 from fdnet.spheres.dump import parse_dump, read_dump, read_frame
 
-HEADER = (
-    "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\n"
-    "ITEM: BOX BOUNDS ff ff ff\n-1 1\n0 2\n0 3\nITEM: ATOMS id type x \n"
-)
-
 
 def frame(step: int, rows: list[str], count: int | None = None) -> str:
-    return HEADER.format(step=step, count=len(rows) if count is None else count) + "".join(
-        row + "\n" for row in rows
-    )
+    count = len(rows) if count is None else count
+    head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: BOX BOUNDS ff ff ff\n"
+    head += "-1 1\n0 2\n0 3\nITEM: ATOMS id type x \n"
+    return head + "".join(row + "\n" for row in rows)
 
 
 def parse(text: str) -> list:
@@ -25,9 +21,8 @@ def parse(text: str) -> list:
 
 
 def test_full_precision_any_order_and_several_frames():
-    first, second = parse(
-        frame(5, ["2 1 0.12345678901234568 ", "1 2 -3e-9 "]) + frame(10, ["1 2 7 "])
-    )
+    text = frame(5, ["2 1 0.12345678901234568 ", "1 2 -3e-9 "]) + frame(10, ["1 2 7 "])
+    first, second = parse(text)
     assert (first.step, second.step) == (5, 10)
     assert first.column("id").tolist() == [1, 2]
     assert first.column("x").tolist() == [-3e-9, 0.12345678901234568]

@@ -8,17 +8,9 @@ import pytest
 from builders import followed, resting_spheres
 
 from fdnet.case.file import case_from
+from fdnet.dem import invade_deck as deck
 from fdnet.dem.checkpoint import quiet_chunks
 from fdnet.dem.deck import specimen_box, write_data
-from fdnet.dem.invade_deck import (
-    FluidForces,
-    Moment,
-    fine_density,
-    read_state,
-    render_invade,
-    write_forces,
-    write_parts,
-)
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.supply import batches_of, densities
@@ -32,7 +24,7 @@ from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 pytestmark = pytest.mark.liggghts
-FIRST = Moment(step=0, time=0.0, before=None, fresh=True)
+FIRST = deck.Moment(step=0, time=0.0, before=None, fresh=True)
 
 
 @pytest.fixture(scope="module")
@@ -202,10 +194,7 @@ def test_the_balance_holds_while_fines_move_at_another_pace_than_the_fluid(fluid
 
 
 def test_the_fines_take_the_share_of_the_pressure_that_resolved_flow_gives_them(fluid, done):
-    """Stokes flow around grains and fines, to a factor of 2: its forces know no network.
-
-    The deposit of 15 grains differs from processor to processor, and the factor from 1.4 to 1.6.
-    """
+    """Stokes flow around grains and fines, to a factor of 2, which knows no network."""
     standing = deposit_of(done)
     depth = standing.position[:, 0]
     inside = standing.where((depth > 5e-5) & (depth < fluid.pack.length))
@@ -266,10 +255,8 @@ def test_a_rate_or_a_volume_that_is_asked_for_ends_the_run(go, fluid, done, tmp_
     share = done.updates[len(done.updates) // 2]["rate_over_initial"]
     asked = float(0.5 * done.updates[-1]["filtrate_m3"] / pores)
     results = {}
-    for reason, key in (
-        ("plugged", f"run.stop_rate={share}"),
-        ("duration", f"run.stop_pore_volumes={asked!r}"),
-    ):
+    by_rate, by_volume = f"run.stop_rate={share}", f"run.stop_pore_volumes={asked!r}"
+    for reason, key in (("plugged", by_rate), ("duration", by_volume)):
         other = with_case(fluid, key)
         result = results[reason] = go(other.case, tmp_path / reason, other)
         assert result.stop_reason == reason
@@ -404,17 +391,17 @@ def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(binary, 
     density = np.array([2650.0, 2650.0, 1100.5])
     data = tmp_path / "invade.data"
     write_data(data, grain.joined(two), bounds=bounds, density=density, types=3)
-    (tmp_path / "in.invade").write_text(render_invade(case, scales_of(case), grain).text)
+    (tmp_path / "in.invade").write_text(deck.render_invade(case, scales_of(case), grain).text)
     (tmp_path / "post").mkdir()
-    write_parts(case, scales_of(case), grain, tmp_path)
+    deck.write_parts(case, scales_of(case), grain, tmp_path)
     still = {"coefficient": np.ones(2), "push": np.zeros((2, 3)), "pace": 1.0, "measures": {}}
     given = np.array([[[1.0, 2.0, -3.0], [4.0, 5.0, 6.0]], [[7.0, 0.0, 0.0], [0.0, -8.0, 0.0]]])
 
     def play(feed):
         feed("include in.invade", "include ask.in")
-        assert np.array_equal(fine_density(read_state(tmp_path)), [2650.0, 1100.5])
+        assert np.array_equal(deck.fine_density(deck.read_state(tmp_path)), [2650.0, 1100.5])
         for number, velocity in enumerate(given):
-            write_forces(tmp_path, two, FluidForces(velocity=velocity, **still))
+            deck.write_forces(tmp_path, two, deck.FluidForces(velocity=velocity, **still))
             show = f"write_dump fines custom post/{number}.dump id f_uf[1] f_uf[2] f_uf[3]"
             feed("include fluid.in", f"{show} modify sort id")
 

@@ -8,17 +8,7 @@ from bench import bench
 from builders import resting_spheres, tiny
 
 from fdnet.dem import checkpoint
-from fdnet.dem.checkpoint import (
-    Checkpoint,
-    Deepest,
-    check_counts,
-    cut_watch,
-    deepest_of,
-    plug_allowance,
-    read_watch,
-    watch_variables,
-    write_watch_parts,
-)
+from fdnet.dem.checkpoint import Deepest, deepest_of, read_watch, watch_variables
 from fdnet.dem.deck import number, render_text, specimen_box
 from fdnet.dem.supply import batches_of, place_batches
 from fdnet.errors import LiggghtsError
@@ -39,9 +29,7 @@ pytestmark = pytest.mark.liggghts
         ["fines.radius_mm=[0.02,0.05]", "fines.friction=0.0", "run={duration_ms=0.25}"],
     ],
 )
-def test_supplied_is_invaded_passed_and_upstream_at_every_checkpoint(
-    go, grains_of, tmp_path, keys
-):
+def test_supplied_is_invaded_passed_and_upstream_always(go, grains_of, tmp_path, keys):
     """And fixed grains do not move, mobile ones by less than a fifth of their radius."""
     case = tiny("run.cap_ms=0.6", *keys)
     result = go(case, tmp_path)
@@ -96,7 +84,7 @@ def test_a_trickle_may_count_as_plugged(go, tmp_path):
     """With `plug_rate` the end comes at the first plug time with no more crossings than that."""
     plug = ("run.plug_time_ms=0.05", "run.plug_rate=0.5")
     case = tiny("fines.count=900", "run.checkpoint_ms=0.01", "run.cap_ms=2", *plug)
-    result, allowed = go(case, tmp_path), plug_allowance(case, scales_of(case))
+    result, allowed = go(case, tmp_path), checkpoint.plug_allowance(case, scales_of(case))
     crossed = [row.invaded + row.passed for row in result.history]
     assert result.stop_reason == "plugged"
     assert 0 < crossed[-1] - crossed[-6] <= allowed
@@ -112,26 +100,23 @@ def test_fines_that_vanish_are_an_error(grains_of, tmp_path):
     (tmp_path / "post").mkdir()
     grains = grains_of(case)
     damaged = grains.joined(next(place_batches(case, scales_of(case), grains)))
-    for counts, supplied, message in (
-        ((200, 90, 5), 300, "fines inside"),
-        ((300, 0, 0), 301, "is not the 301 supplied"),
-    ):
-        row = Checkpoint(1, 10, *counts, 0, 0, 0)
+    more = (300, 0, 0), 301, "is not the 301 supplied"
+    for counts, supplied, message in (((200, 90, 5), 300, "fines inside"), more):
+        row = checkpoint.Checkpoint(1, 10, *counts, 0, 0, 0)
         with pytest.raises(LiggghtsError, match=message):
-            check_counts(tmp_path, row, damaged, supplied)
+            checkpoint.check_counts(tmp_path, row, damaged, supplied)
 
 
 # ---- The overlap of fines: it is measured right and changes no motion.
 def test_what_was_seen_is_read_line_by_line(tmp_path):
     assert list(read_watch(tmp_path)) == []
-    (tmp_path / "overlap.csv").write_text(
-        "# step,overlap\n50,-1e+24\n100,0.02\n# step,overlap\n150,0.01\n1,x\n200,0."
-    )
+    text = "# step,overlap\n50,-1e+24\n100,0.02\n# step,overlap\n150,0.01\n1,x\n200,0."
+    (tmp_path / "overlap.csv").write_text(text)
     seen = list(read_watch(tmp_path))
     assert seen == [(50, 0.0), (100, 0.02), (150, 0.01)]
     assert deepest_of(seen) == Deepest(step=100, fraction=0.02)
     assert deepest_of([]) == Deepest(step=0, fraction=0.0)
-    cut_watch(tmp_path, 100)
+    checkpoint.cut_watch(tmp_path, 100)
     assert [row.step for row in read_watch(tmp_path)] == [50, 100]
 
 
@@ -146,7 +131,7 @@ def test_the_deck_sees_the_overlap_of_an_impact(tmp_path):
     pair = resting_spheres(places, 2.5e-4, box, kind=Kind.GRAIN)
     place = [[2e-3 - 3.05e-4, 8e-4, 8e-4]]
     fine = resting_spheres(place, radius, box, kind=Kind.FINE, first=3)
-    write_watch_parts(case, pair, tmp_path)
+    checkpoint.write_watch_parts(case, pair, tmp_path)
     watch = watch_variables(case, scales, pair) | {"every": 2}
     text = f"fix still grains freeze\nvelocity fines set {number(speed)} 0 0 units box\n"
     text += render_text("_overlap.in.j2", {"overlap": watch})

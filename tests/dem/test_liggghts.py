@@ -90,9 +90,7 @@ def test_a_run_is_stopped_at_its_time_limit(fake, tmp_path):
 def test_the_run_dies_with_its_parent(fake, tmp_path):
     """kill -9 of Python must not leave an orphan that writes into a resumed run."""
     (tmp_path / "mode").write_text("hang")
-    code = (
-        "from pathlib import Path\nfrom fdnet.dem.liggghts import find_binary, Launch, run_deck\n"
-    )
+    code = "from pathlib import Path\nfrom fdnet.dem.liggghts import *\n"
     code += f"launch = Launch(binary=find_binary({str(fake.path)!r}))\n"
     code += f"run_deck(Path({str(tmp_path)!r}), 'in.deck', launch)"
     parent = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)

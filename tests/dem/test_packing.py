@@ -70,9 +70,8 @@ def test_a_pack_that_creeps_is_taken_and_one_that_moves_is_refused(tmp_path):
     still = resting(np.random.default_rng(1).random((50, 3)) * 1e-3, 0.25e-3, specimen_box(case))
     direction = np.random.default_rng(2).normal(size=(50, 3))
     direction /= np.sqrt(np.mean(np.sum(direction**2, axis=1)))
-    slow, fast = (
-        replace(still, velocity=share * natural * direction) for share in (0.99e-5, 1.01e-5)
-    )
+    speeds = 0.99e-5 * natural, 1.01e-5 * natural
+    slow, fast = (replace(still, velocity=speed * direction) for speed in speeds)
     assert creep_of(case, step, tmp_path, slow) == pytest.approx(0.99e-5 * natural)
     with pytest.raises(LiggghtsError, match="did not come to rest in 80000 steps"):
         creep_of(case, step, tmp_path, fast)
@@ -106,10 +105,8 @@ def test_what_cannot_be_packed_is_an_error_with_what_can(packed):
         assert re.search(message, str(error.value)), keys
 
 
-def test_a_pack_that_does_not_rest_is_made_again_from_the_next_places_and_given_up(
-    binary, packed, tmp_path, monkeypatch
-):
-    """The first one is called restless; the second starts from other places, the same radii."""
+def test_a_pack_that_does_not_rest_is_made_again(binary, packed, tmp_path, monkeypatch):
+    """The second starts from other places with the same radii; after some it is given up."""
     for name, value in (("REST_RUNS", 1), ("RELAX_RUN_STEPS", 10), ("PLACES", 2)):
         monkeypatch.setattr(f"fdnet.dem.packing.{name}", value)
     with pytest.raises(RestlessError, match="tried 2 times from other places"):

@@ -17,7 +17,6 @@ from robustness.runs import contents
 
 from fdnet.dem.checkpoint import (
     UPDATES,
-    WATCH,
     Checkpoints,
     file_digest,
     read_updates,
@@ -152,9 +151,8 @@ def test_notes_between_the_checkpoints_are_passed_over_and_kept(go, cut):
 
 
 def test_a_changed_history_is_refused(go, done, tmp_path):
-    for row, (what, lines) in product(
-        (1, 2), {"gone": [], "garbled": ["?,?\n"], "changed": ["1,2,3,4,5,6,7,8\n"]}.items()
-    ):
+    changes = {"gone": [], "garbled": ["?,?\n"], "changed": ["1,2,3,4,5,6,7,8\n"]}
+    for row, (what, lines) in product((1, 2), changes.items()):
         folder = shutil.copytree(done[0], tmp_path / f"{what}{row}")
         rows = (folder / "history.csv").read_text().splitlines(keepends=True)
         rows[row : row + 1] = lines
@@ -228,9 +226,7 @@ def rising(go, tmp_path_factory):
     return folder, go(RISING, folder)
 
 
-def test_springs_that_grow_with_the_load_keep_overlaps_small_and_go_on_bit_for_bit(
-    go, rising, tmp_path
-):
+def test_springs_grow_with_the_load_and_go_on_bit_for_bit(go, rising, tmp_path):
     folder, whole = rising
     steps = np.diff([0, *(row.step for row in whole.history)])
     assert steps[-1] > steps[0], "no spring was stiffened"
@@ -253,13 +249,11 @@ def test_springs_that_grow_with_the_load_keep_overlaps_small_and_go_on_bit_for_b
 
 
 @pytest.mark.parametrize("spoil", [noise, Path.unlink])
-def test_springs_do_not_follow_from_a_dump_that_is_not_the_recorded_one(
-    go, rising, tmp_path, spoil
-):
+def test_springs_do_not_follow_from_a_dump_that_is_spoilt(go, rising, tmp_path, spoil):
     """Without watched overlaps the springs of a chunk follow from the dumps of the two before."""
     folder, history = shutil.copytree(rising[0], tmp_path / "cut"), rising[1].history
     kept = points(folder, RISING)
-    (folder / WATCH).unlink()
+    (folder / "overlap.csv").unlink()
     for suffix in ("dump", "restart", "record"):
         kept.path(history[-1].step, suffix).unlink()
     for row in history[:-1]:
@@ -300,9 +294,7 @@ def test_a_changed_record_of_updates_makes_the_checkpoint_unusable(coupled, tmp_
     assert points(folder, small()).last() == whole.history[-2]
 
 
-def test_liggghts_that_is_killed_is_reported_and_the_run_goes_on_bit_for_bit(
-    go, coupled, tmp_path
-):
+def test_liggghts_is_killed_and_the_run_goes_on_bit_for_bit(go, coupled, tmp_path):
     def kill(line: str) -> None:
         if line.startswith("FDNET checkpoint 3 "):
             children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fdnet.errors import MechanicsError
+from fdnet.mechanics import triaxial as loading
 from fdnet.mechanics.elastic import elastic_of, voigt_average
 from fdnet.mechanics.springs import (
     Cement,
@@ -19,18 +20,7 @@ from fdnet.mechanics.springs import (
     kinematics,
     stiffness_matrix,
 )
-from fdnet.mechanics.triaxial import (
-    SOUND,
-    TENSION,
-    Load,
-    Triaxial,
-    at_rest,
-    balance,
-    carried_out,
-    loaded_pack,
-    overloaded,
-    triaxial,
-)
+from fdnet.mechanics.triaxial import Triaxial, triaxial
 from fdnet.spheres.snapshot import resting
 from tests.network import packs
 
@@ -162,16 +152,16 @@ def test_bonds_break_in_tension_and_shear_at_their_strength():
     material = replace(SAND, cement=cement)
     place = np.array([[2 * n + 1, 2, 2] for n in range(4)]) * R
     box = np.array([[0, 8 * R], [0, 4 * R], [0, 4 * R]])
-    pack = at_rest(resting(place, R, box), material, ALL, relieved=True)
+    pack = loading.at_rest(resting(place, R, box), material, ALL, relieved=True)
     for share in (0.99, 1.01):
         strain = np.array([share * 1e7 / (1e14 * 2 * R), 0, 0])
-        loaded = loaded_pack(pack, replace(material, glued=False), ALL)
-        load = Load(strain=strain, stress=np.zeros(3), drag=1e-3, within=1e-12)
-        _, forces = carried_out(loaded, *balance(loaded, load)[:2])
-        ratio, how = overloaded(loaded, forces)
+        loaded = loading.loaded_pack(pack, replace(material, glued=False), ALL)
+        load = loading.Load(strain=strain, stress=np.zeros(3), drag=1e-3, within=1e-12)
+        _, forces = loading.carried_out(loaded, *loading.balance(loaded, load)[:2])
+        ratio, how = loading.overloaded(loaded, forces)
         assert ratio.max() == pytest.approx(share, rel=1e-3)
-        assert how[np.argmax(ratio)] == TENSION
-    assert np.all(pack.memory.broken == SOUND)
+        assert how[np.argmax(ratio)] == loading.TENSION
+    assert np.all(pack.memory.broken == loading.SOUND)
     twist = np.zeros((len(loaded.joints), 6))
     twist[:, 3] = 1e-6
     tension, shear = bond_stress(twist, disc_radius(loaded.joints, material))

@@ -26,7 +26,7 @@ def dump_text(pack: Snapshot, columns: str = COLUMNS, *, step: int = 7) -> str:
 
 def lattice_dump(
     columns=COLUMNS, *, step=0, bounds="pp pp pp", sides="0 3", rows=27, end=" \n", gap=" "
-) -> str:
+):
     """The lattice at PLACES as LIGGGHTS dumps it, with cells between `gap`."""
     head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n27\nITEM: BOX BOUNDS {bounds}\n"
     lines = [head + f"{sides}\n" * 3 + f"ITEM: ATOMS {columns} \n"]

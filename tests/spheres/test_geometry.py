@@ -47,9 +47,7 @@ def test_bins_of_one_sphere_are_its_spherical_segments_and_average_to_the_mean()
 
 
 def test_no_two_of_a_group_touch_and_groups_are_few():
-    """Lattices whose number of groups is known, or its bounds: the cliques of a face-centred
-    lattice have four spheres, and its spheres twelve contacts (exact contact counts here).
-    """
+    """At least the spheres of a clique, four in a face-centred lattice; at most contacts + 1."""
     corner, faces = [[0, 0, 0]], [[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]]
     for name, cell, cells, radius, least, most in [
         ("apart", corner, 4, 0.49, 1, 1),

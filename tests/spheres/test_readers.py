@@ -69,11 +69,8 @@ def test_what_was_written_comes_back(pack, tmp_path):
         assert np.array_equal(given.spheres.box, pack.box)
         assert given.spheres.step == 7
         assert any("type 1 is a grain" in sentence for sentence in given.assumptions)
-    for columns in (
-        "id type xu yu zu radius",
-        "type id xs ys zs radius",
-        "id type x y z diameter",
-    ):
+    for names in ("xu yu zu radius", "xs ys zs radius", "x y z diameter"):
+        columns = f"id type {names}"
         other = read_spheres(write(tmp_path / "atoms.lammpstrj", dump_text(pack, columns)))
         assert other.position == pytest.approx(pack.position, rel=1e-12, abs=1e-15), columns
         assert other.radius == pytest.approx(pack.radius, rel=1e-15, abs=0), columns

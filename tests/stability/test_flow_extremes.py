@@ -11,8 +11,7 @@ from fdnet.errors import FlowError
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.flow.sections import plane_pressures, whole_permeability
 from fdnet.network.laws.named import LAWS
-from fdnet.network.network import Network, build_network
-from fdnet.spheres.snapshot import Array
+from fdnet.network.network import build_network
 from tests.network.networks import chain
 from tests.network.packs import random_pack
 
@@ -23,7 +22,7 @@ def test_one_bad_conductance_among_many_is_refused_and_named():
             solve_flow(chain(9), np.array([1.0] * 7 + [bad, 1.0]))
 
 
-def pack_network() -> tuple[Network, Array]:
+def pack_network():
     network = build_network(random_pack(120), periodic=(False, True, True), walls="slip")
     return network, LAWS["lubrication"](network)
 
