@@ -15,13 +15,7 @@ from builders import followed, tiny
 from cut_and_continue import cell_case, differences
 from robustness.runs import contents
 
-from fdnet.dem.checkpoint import (
-    UPDATES,
-    Checkpoints,
-    file_digest,
-    read_updates,
-    rows_digest,
-)
+from fdnet.dem.checkpoint import UPDATES, Checkpoints, file_digest, read_updates, rows_digest
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.supply import batches_of
