@@ -8,15 +8,7 @@ import pytest
 
 from fdnet.spheres.snapshot import Kind, resting
 from validation import truth
-from validation.accuracy import (
-    ARCHIE,
-    FINEST,
-    SLABS,
-    THROATS,
-    by_all_spheres,
-    slab_row,
-    tables,
-)
+from validation.accuracy import ARCHIE, FINEST, SLABS, THROATS, by_all_spheres, slab_row, tables
 
 
 def test_laws_on_a_slab():

@@ -26,9 +26,7 @@ def keys(*assignments: str) -> set[str]:
 
 WELL = ("well.radius_mm=108", "well.drainage_radius_m=100")
 
-
 BULKY = ("box.size_mm=[3.0,3.0,3.0]", "grains.count=248", "box.sides=periodic")
-
 
 SOUND = (*WELL, *BULKY, "fines.count=3000")
 

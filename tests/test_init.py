@@ -13,7 +13,6 @@ from fdnet.scales.scales import scales_of
 
 SAND = {"--sand-d10": "0.25 mm", "--sand-d50": "0.40 mm", "--sand-d90": "0.60 mm"}
 
-
 MUD = {
     "--porosity": "0.38",
     "--mud-d50": "40 um",

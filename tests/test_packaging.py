@@ -25,7 +25,6 @@ assert liggghts_templates.__file__.startswith(sys.argv[3])
 print(fdnet.__file__, fast, run.sections.shape[0], again.k_damaged / run.summary["k_damaged_m2"])
 """
 
-
 COMES_WITH = {"PIL": "matplotlib", "pydantic_core": "pydantic", "vtkmodules": "pyvista"}
 """Modules that are imported, and the dependency whose own requirements bring them."""
 

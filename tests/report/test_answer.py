@@ -252,7 +252,6 @@ SUMMARY = {
 
 WELL = {"skin": 0.056, "skin_flow_lost": 0.0081, "skin_well_radius_m": 0.108}
 
-
 FLOW = {"drag_last_update": {"k_over_k0": 0.278}, "damage_law_used": "thesis"}
 
 

@@ -11,12 +11,7 @@ import fdnet
 from fdnet.case.file import case_from, parse_sizes, read_case, read_size_file
 from fdnet.dem.deck import specimen_box
 from fdnet.dem.invade_deck import InvadeInputs
-from fdnet.dem.supply import (
-    batches_of,
-    densities,
-    drawn_fines,
-    place_batches,
-)
+from fdnet.dem.supply import batches_of, densities, drawn_fines, place_batches
 from fdnet.errors import CaseError
 from fdnet.scales.contacts import mass_range
 from fdnet.scales.scales import scales_of

@@ -13,13 +13,7 @@ from fdnet.scales.scales import scales_of
 from tests.network.exact import exact_balance, random_links
 from validation import study
 from validation.linear_solver import Circuit, exact_fluxes
-from validation.small_systems import (
-    SPEED,
-    deepest_overlap_of,
-    measure,
-    restitution_of,
-    slab_case,
-)
+from validation.small_systems import SPEED, deepest_overlap_of, measure, restitution_of, slab_case
 
 
 def measured(work: Path, values, measure=measure, *, knob="k", seed=1, **settings) -> dict:

@@ -9,13 +9,7 @@ from fdnet.errors import CaseError
 from fdnet.network.stokes import solve_slab, solve_stokes
 from fdnet.spheres.snapshot import Kind, resting
 from validation import truth
-from validation.truth_solved import (
-    SLAB_TOLERANCE,
-    case_of,
-    limit,
-    made_anew,
-    solved_anew,
-)
+from validation.truth_solved import SLAB_TOLERANCE, case_of, limit, made_anew, solved_anew
 
 
 def test_spheres_and_tables_are_read_as_they_were_written(tmp_path):
