@@ -69,10 +69,7 @@ def write_bytes(path: str | Path, content: bytes) -> Path:
     return Path(path)
 
 
-# ------------------------------------------------------------------------------------------------
-# Files that a command makes for the user: none is ever replaced unasked.
-
-
+# ---- Files that a command makes for the user: none is ever replaced unasked.
 def refuse_present(path: Path, *, force: bool) -> None:
     """Raise CaseError where a file is there and may not be replaced, or its folder is missing."""
     if path.exists() and not force:
@@ -90,10 +87,7 @@ def write_new(path: Path, text: str, *, force: bool) -> None:
     write_text(path, text)
 
 
-# ------------------------------------------------------------------------------------------------
-# Paths and files as a user gives them, made fit for every library before they are used.
-
-
+# ---- Paths and files as a user gives them, made fit for every library before they are used.
 SMALL, LARGE = 16 * 2**20, 4 * 2**30
 """Most bytes of a case, a sweep or a table of sizes, and of a file of spheres."""
 _ZIPPED = b"\x1f\x8b"

@@ -54,10 +54,7 @@ def law_pairs() -> list[tuple[LawName, DamageLawName]]:
     return [*pairs, (DEFAULT_LAW, ALL_SPHERES)]
 
 
-# ------------------------------------------------------------------------------------------------
-# The stages of a run, in order.
-
-
+# ---- The stages of a run, in order.
 Stage = Literal["pack", "invade", "clean_up", "analyse", "report"]
 STAGES: tuple[Stage, ...] = get_args(Stage)
 LIGGGHTS_STAGES = STAGES[:3]

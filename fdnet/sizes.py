@@ -152,10 +152,7 @@ def _normal_shares(z: Array) -> Array:
     return np.asarray(np.where(below & above, 1 - tail[1:] - tail[:-1], same_side))
 
 
-# ------------------------------------------------------------------------------------------------
-# The curve of sizes of some spheres: a law between two cuts, all moments and conversions.
-
-
+# ---- The curve of sizes of some spheres: a law between two cuts, all moments and conversions.
 NUMBER, SURFACE, VOLUME = 0, 2, 3
 """By what a law counts: the power of the diameter."""
 CELLS = 4096
@@ -331,10 +328,7 @@ def _by_volume(law: Law, by: int) -> Points:
     return Points(tuple(wide.edges[keep].tolist()), tuple(finer[keep].tolist()))
 
 
-# ------------------------------------------------------------------------------------------------
-# Sorted spheres dealt out to batches so that each batch has the curve of all.
-
-
+# ---- Sorted spheres dealt out to batches so that each batch has the curve of all.
 def dealt(counts: Sequence[int], rng: np.random.Generator) -> list[NDArray[np.int64]]:
     """For each batch the indices, into spheres sorted by size, that it gets.
 
@@ -362,10 +356,7 @@ def volume_quantiles(diameter: Array, shares: Sequence[float]) -> list[float]:
     return [float(one) for one in np.exp(np.interp(shares, middle, np.log(rising)))]
 
 
-# ------------------------------------------------------------------------------------------------
-# Laws of size through measured points, and by how much they miss them.
-
-
+# ---- Laws of size through measured points, and by how much they miss them.
 LOG_NORMAL, ROSIN_RAMMLER = "log-normal", "rosin-rammler"
 
 

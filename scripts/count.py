@@ -68,11 +68,7 @@ def lines(paths: list[Path]) -> int:
 
 def main() -> None:
     """Print the counts as a table."""
-    folders = {
-        "campaign": "fdnet/campaign",
-        "evidence": "scripts/validation",
-        "tests": "tests",
-    }
+    folders = {"campaign": "fdnet/campaign", "evidence": "scripts/validation", "tests": "tests"}
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "docs").rglob("*.md.in")]
     pages = [page for page in pages if page.name != "CHANGELOG.md" and "_build" not in page.parts]
     words = sum(len(page.read_text("utf-8").split()) for page in pages)

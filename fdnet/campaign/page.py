@@ -36,14 +36,10 @@ class Compared:
 
     The variants of an ensemble are one. Quantities are the numbers of summary.json by dotted key,
     as "k_reduction" or "sections.1.k_damaged_m2", in SI.
-
-    Attributes:
-        comparison: the runs themselves.
-        limits: the targets of a sweep, SI.
     """
 
-    comparison: Comparison
-    limits: Mapping[str, float] = field(default_factory=dict)
+    comparison: Comparison  # the runs themselves
+    limits: Mapping[str, float] = field(default_factory=dict)  # the targets of a sweep, SI
 
     @cached_property
     def summary(self) -> Mapping[str, Any]:

@@ -217,10 +217,7 @@ def with_fines(case: Case) -> InvasionCase:
     return case
 
 
-# ------------------------------------------------------------------------------------------------
-# Which keys of two cases differ, in words.
-
-
+# ---- Which keys of two cases differ, in words.
 MOST_NAMED = 4
 """Most differing keys that a message names."""
 
@@ -249,10 +246,7 @@ def _flat(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]
             yield f"{path}{key}", value
 
 
-# ------------------------------------------------------------------------------------------------
-# What must hold between the keys of a case.
-
-
+# ---- What must hold between the keys of a case.
 WIDEST_THROAT = math.sqrt(2) - 1
 """Radius of the widest throat between touching grains over their radius: four in a square."""
 EXCLUSIVE = {

@@ -22,10 +22,7 @@ from fdnet.case.units import SUFFIXES, converted, length_factor, share_of, stem_
 from fdnet.errors import CaseError
 from fdnet.files import SMALL, expanded, file_bytes, text_of
 
-# ------------------------------------------------------------------------------------------------
-# Curves of sizes in CSV files: tables of sieves and of laser instruments.
-
-
+# ---- Curves of sizes in CSV files: tables of sieves and of laser instruments.
 _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _FINER = r"passing|finer|under|smaller|less|<"
 _COARSER = r"retained|over|coarser|larger|greater|>"
@@ -154,10 +151,7 @@ def _row(row: list[str], sizes: int, percents: int, *, comma: bool) -> tuple[flo
     return values[0], values[1]
 
 
-# ------------------------------------------------------------------------------------------------
-# The keys of a case file, and the one that an unknown key means.
-
-
+# ---- The keys of a case file, and the one that an unknown key means.
 _DIAMETER = re.compile(r"[dD]_?\d\d")
 
 
@@ -326,10 +320,7 @@ def _curve(spoken: Spoken, dotted: str, value: Any, table: Mapping[str, Any]) ->
     return {}
 
 
-# ------------------------------------------------------------------------------------------------
-# Case files: a case is read from TOML, and all its problems are named at once.
-
-
+# ---- Case files: a case is read from TOML, and all its problems are named at once.
 def case_from(data: Mapping[str, Any], *, source: str = "case", folder: str | Path = ".") -> Case:
     """A case from nested tables; an InvasionCase when there is a table of fines.
 
@@ -555,10 +546,7 @@ def toml_tables(path: str | Path, what: str = "a case file") -> dict[str, Any]:
         raise CaseError(f"{path}: not valid TOML: {error}") from error
 
 
-# ------------------------------------------------------------------------------------------------
-# The case files that come with fdnet.
-
-
+# ---- The case files that come with fdnet.
 QUICK = "quick-"
 
 

@@ -77,37 +77,21 @@ class Narrowed(NamedTuple):
 
 @dataclass(slots=True, eq=False, kw_only=True)
 class FinerClasses:
-    """Where the finer classes (C) are, from one update to the next.
+    """Where the finer classes (C) are, from one update to the next."""
 
-    Attributes:
-        network: of the grains, with pores in N groups and throats (T).
-        sieve: the same as solids meet it.
-        classes: (C) and, as the last one, the spheres.
-        bed: grains and fluid, for what sticks to them.
-        sticking: share of the contacts with grains that stick.
-        release: what the flow lifts; None: nothing.
-        mud: m3 that come at most.
-        cake: m2, permeability of the cake of classes, where the case gives it.
-        solids: of the classes (C).
-        kept: (T, 2) share that the classes leave of what the spheres leave.
-        flux: (T,) m3, of the last solve.
-        pressure: (N,) of the last solve.
-        solved: m3 of them that the last solve knew.
-    """
-
-    network: Network
-    sieve: Sieve
-    classes: SizeClasses
-    bed: Bed
-    sticking: float
-    release: Release | None
-    mud: float
-    cake: float | None
-    solids: Deposits
-    kept: Array
-    flux: Array
-    pressure: Array
-    solved: float = 0.0
+    network: Network  # of the grains, with pores in N groups and throats (T)
+    sieve: Sieve  # the same as solids meet it
+    classes: SizeClasses  # (C) and, as the last one, the spheres
+    bed: Bed  # grains and fluid, for what sticks to them
+    sticking: float  # share of the contacts with grains that stick
+    release: Release | None  # what the flow lifts; None: nothing
+    mud: float  # m3 that come at most
+    cake: float | None  # m2, permeability of the cake of classes, where the case gives it
+    solids: Deposits  # of the classes (C)
+    kept: Array  # (T, 2) share that the classes leave of what the spheres leave
+    flux: Array  # (T,) m3, of the last solve
+    pressure: Array  # (N,) of the last solve
+    solved: float = 0.0  # m3 of them that the last solve knew
 
     def among(self, passed: Passed, spheres: Stands) -> Narrowed:
         """Carry the classes on by what `passed`, among the `spheres` that stand."""

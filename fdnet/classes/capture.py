@@ -23,21 +23,13 @@ A bed of spheres holds what is larger than this of its own."""
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SizeClasses:
-    """Deposits of a mud as classes (C), from fine to coarse.
+    """Deposits of a mud as classes (C), from fine to coarse."""
 
-    Attributes:
-        low: (C,) m, smallest diameter of each.
-        high: (C,) m, largest diameter.
-        diameter: (C,) m, with which a class acts: that of its mean volume by number.
-        concentration: (C,) volume over that of the mud.
-        density: (C,) kg/m3.
-    """
-
-    low: Array
-    high: Array
-    diameter: Array
-    concentration: Array
-    density: Array
+    low: Array  # (C,) m, smallest diameter of each
+    high: Array  # (C,) m, largest diameter
+    diameter: Array  # (C,) m, with which a class acts: that of its mean volume by number
+    concentration: Array  # (C,) volume over that of the mud
+    density: Array  # (C,) kg/m3
 
     __repr__ = one_line
 
@@ -82,10 +74,7 @@ def mud_classes(fines: Fines, count: int, *, below: float = math.inf) -> SizeCla
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# Straining and bridging in throats.
-
-
+# ---- Straining and bridging in throats.
 def wider_share(classes: SizeClasses, passage: Array) -> Array:
     """Share (K, C) of each class that is wider than passages (K,) m; even over ln d in a class."""
     low, high = np.log(classes.low), np.log(classes.high)
@@ -107,27 +96,16 @@ def bridging_chance(ratio: Array) -> Array:
     return np.where(ratio < 1.0, np.interp(ratio, at, chance), 0.0)
 
 
-# ------------------------------------------------------------------------------------------------
-# Attachment to the surface of grains.
-
-
+# ---- Attachment to the surface of grains.
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bed:
-    """A bed of grains and the fluid in it, SI units.
+    """A bed of grains and the fluid in it, SI units."""
 
-    Attributes:
-        diameter: m, of the grains.
-        porosity: of the bed.
-        velocity: m/s, superficial.
-        viscosity: Pa s.
-        density: kg/m3, of the fluid.
-    """
-
-    diameter: float
-    porosity: float
-    velocity: float
-    viscosity: float
-    density: float
+    diameter: float  # m, of the grains
+    porosity: float  # of the bed
+    velocity: float  # m/s, superficial
+    viscosity: float  # Pa s
+    density: float  # kg/m3, of the fluid
 
 
 def collector_efficiency(diameter: Array, density: Array, bed: Bed) -> Array:

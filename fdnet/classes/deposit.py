@@ -11,13 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fdnet.classes.capture import (
-    TIGHT,
-    SizeClasses,
-    bridging_chance,
-    covered,
-    wider_share,
-)
+from fdnet.classes.capture import TIGHT, SizeClasses, bridging_chance, covered, wider_share
 from fdnet.classes.transport import Streams, Swept, carry
 from fdnet.network.flow.flow import PLANE_TOLERANCE
 from fdnet.network.network import Network
@@ -29,41 +23,23 @@ PACKED = 0.40
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Sieve:
-    """Pores (N) and throats (T) as solids meet them, SI units; a pore is a group of `Network`.
+    """Pores (N) and throats (T) as solids meet them, SI units; a pore is a group of `Network`."""
 
-    Attributes:
-        ends: (T, 2) the pores that a throat joins.
-        passage: (T,) m, diameter of the largest sphere that passes the clean throat.
-        opening: (T,) m, radius of the circle of its open area.
-        halves: (T, 2) 1/m3, resistances of the sides of the clean throat.
-        reach: (T,) m, length of the throat.
-        winding: the tortuosity of the flow.
-        void: (N,) m3 inside the box.
-        room: (N,) m, cubic root of the mean void of the tetrahedra that make up a pore.
-        surface: (N,) m2 of grains.
-        place: (N, 3) m.
-        throat_place: (T, 3) m.
-        inlet: (N,) whether a pore lies on the formation face.
-        outlet: (N,) whether it lies on the other end.
-        area: m2, of the face.
-        length: m, of the specimen.
-    """
-
-    ends: Array
-    passage: Array
-    opening: Array
-    halves: Array
-    reach: Array
-    winding: float
-    void: Array
-    room: Array
-    surface: Array
-    place: Array
-    throat_place: Array
-    inlet: Array
-    outlet: Array
-    area: float
-    length: float
+    ends: Array  # (T, 2) the pores that a throat joins
+    passage: Array  # (T,) m, diameter of the largest sphere that passes the clean throat
+    opening: Array  # (T,) m, radius of the circle of its open area
+    halves: Array  # (T, 2) 1/m3, resistances of the sides of the clean throat
+    reach: Array  # (T,) m, length of the throat
+    winding: float  # the tortuosity of the flow
+    void: Array  # (N,) m3 inside the box
+    room: Array  # (N,) m, cubic root of the mean void of the tetrahedra that make up a pore
+    surface: Array  # (N,) m2 of grains
+    place: Array  # (N, 3) m
+    throat_place: Array  # (T, 3) m
+    inlet: Array  # (N,) whether a pore lies on the formation face
+    outlet: Array  # (N,) whether it lies on the other end
+    area: float  # m2, of the face
+    length: float  # m, of the specimen
 
     __repr__ = one_line
 
@@ -102,25 +78,15 @@ def sieve_of(network: Network, halves: Array, flux: Array) -> Sieve:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Deposits:
-    """Where the solids of classes (C) are, m3: in pores (N), throats (T), the cake, and beyond.
+    """Where the solids of classes (C) are, m3: in pores (N), throats (T), the cake, and beyond."""
 
-    Attributes:
-        carried: (N, C) in the fluid of the pores.
-        in_pores: (N, C) held in pores.
-        attached: (N, C) stuck to the grains of pores.
-        in_throats: (T, C) held in throats.
-        cake: (C,) before the face.
-        passed: (C,) through the outlet.
-        supplied: (C,) all that came to the face.
-    """
-
-    carried: Array
-    in_pores: Array
-    attached: Array
-    in_throats: Array
-    cake: Array
-    passed: Array
-    supplied: Array
+    carried: Array  # (N, C) in the fluid of the pores
+    in_pores: Array  # (N, C) held in pores
+    attached: Array  # (N, C) stuck to the grains of pores
+    in_throats: Array  # (T, C) held in throats
+    cake: Array  # (C,) before the face
+    passed: Array  # (C,) through the outlet
+    supplied: Array  # (C,) all that came to the face
 
     __repr__ = one_line
 
@@ -147,10 +113,7 @@ def no_solids(sieve: Sieve, classes: SizeClasses) -> Deposits:
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# What the deposit leaves of passages, pores and conductances.
-
-
+# ---- What the deposit leaves of passages, pores and conductances.
 LOOSE = 0.29
 """Share by which solids in a pore pack less densely, for each of their diameters over the cubic
 root of its void: 0.55 of the void at 0.35, 0.42 at 0.9, 0.38 at 1.2 (docs/theory/size_classes)."""
@@ -221,10 +184,7 @@ def bed_holds(size: Array, classes: SizeClasses) -> Array:
     return np.where(size[:, None] > 0, wider_share(classes, TIGHT * size), 0.0)
 
 
-# ------------------------------------------------------------------------------------------------
-# What each link holds back, and where that goes.
-
-
+# ---- What each link holds back, and where that goes.
 LOADED = (0.06, 1.6, 0.33)
 """Chance per arrival that a deposit beside a throat stops a fine: a + b s, at most c, of the share
 s that it takes of the two pores."""
@@ -232,17 +192,11 @@ s that it takes of the two pores."""
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Holding:
-    """What links (K) and the face hold back in one step.
+    """What links (K) and the face hold back in one step."""
 
-    Attributes:
-        held: (K, C) share of each class that a link holds back.
-        stuck: (K, C) the part of it that sticks to grains, as a share of all.
-        admitted: (N, C) share of the mud's solids that enter a pore of the face.
-    """
-
-    held: Array
-    stuck: Array
-    admitted: Array
+    held: Array  # (K, C) share of each class that a link holds back
+    stuck: Array  # (K, C) the part of it that sticks to grains, as a share of all
+    admitted: Array  # (N, C) share of the mud's solids that enter a pore of the face
 
     __repr__ = one_line
 
@@ -312,7 +266,7 @@ def advanced(
     )
     count = len(sieve.void)
     sticks = np.divide(what.stuck, what.held, out=np.zeros_like(what.held), where=what.held > 0)
-    stuck = carried.held * sticks
+    stuck = carried.held * np.minimum(sticks, 1.0)  # not above it by rounding
     rest = carried.held - stuck
     wedged = np.minimum(solids.in_throats @ (1.0 / classes.volume), 1.0)
     room = 1.0 - wedged[streams.link]
@@ -340,20 +294,12 @@ def advanced(
     return carried, after
 
 
-# ------------------------------------------------------------------------------------------------
-# Release: the flow lifts what sticks where it pulls at the wall hard enough.
-
-
+# ---- Release: the flow lifts what sticks where it pulls at the wall hard enough.
 class Release(NamedTuple):
-    """What the flow lifts.
+    """What the flow lifts."""
 
-    Attributes:
-        stress: Pa, of the wall of a throat, above which it does.
-        time: s, in which it lifts all but 1/e.
-    """
-
-    stress: float
-    time: float
+    stress: float  # Pa, of the wall of a throat, above which it does
+    time: float  # s, in which it lifts all but 1/e
 
 
 def released(

@@ -85,37 +85,21 @@ PackStateOf = Callable[[Array], PackState]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
-    """What drives an invasion and what ends it, SI units.
+    """What drives an invasion and what ends it, SI units."""
 
-    Attributes:
-        velocity: m/s, superficial, through the intact pack.
-        resistance: 1/m, of the intact pack.
-        rest: resistance of the way beyond it, over that.
-        at_rate: whether the velocity stays, and not the pressure.
-        cake_permeability: m2; None: by Carman and Kozeny of what is in it.
-        duration: s; None: until the stop rule holds.
-        plug_rate: share of the first supply that may enter while the face counts as plugged.
-        plug_time: s, for which that must hold.
-        cap_time: s, when the invasion ends at the latest.
-        supply: m3 of solids that come at most.
-        sticking: share of contacts with grains that stick.
-        release: what the flow lifts; None: nothing.
-        bed: grains and fluid, for what sticks.
-    """
-
-    velocity: float
-    resistance: float
-    rest: float
-    at_rate: bool
-    cake_permeability: float | None
-    duration: float | None
-    plug_rate: float
-    plug_time: float
-    cap_time: float
-    supply: float
-    sticking: float
-    release: Release | None
-    bed: Bed
+    velocity: float  # m/s, superficial, through the intact pack
+    resistance: float  # 1/m, of the intact pack
+    rest: float  # resistance of the way beyond it, over that
+    at_rate: bool  # whether the velocity stays, and not the pressure
+    cake_permeability: float | None  # m2; None: by Carman and Kozeny of what is in it
+    duration: float | None  # s; None: until the stop rule holds
+    plug_rate: float  # share of the first supply that may enter while the face counts as plugged
+    plug_time: float  # s, for which that must hold
+    cap_time: float  # s, when the invasion ends at the latest
+    supply: float  # m3 of solids that come at most
+    sticking: float  # share of contacts with grains that stick
+    release: Release | None  # what the flow lifts; None: nothing
+    bed: Bed  # grains and fluid, for what sticks
 
 
 def release_of(case: InvasionCase) -> Release | None:
@@ -139,20 +123,13 @@ def bed_of(case: InvasionCase, scales: InvasionScales, velocity: float) -> Bed:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ClassInvasion:
-    """The end of an invasion and its history.
+    """The end of an invasion and its history."""
 
-    Attributes:
-        solids: where they are.
-        kept: (T, 2) share of its conductance that each side of a throat keeps.
-        rows: one a step: time, rate, filtrate, solids, cake.
-        by_class: (S, 3, C) m3 inside, passed and in the cake at each of these steps.
-        stop_reason: "plugged", "duration", "supply_exhausted" or "cap"; "" where it is not asked.
-    """
-
-    solids: Deposits
-    kept: Array
-    rows: tuple[Mapping[str, float], ...]
-    by_class: Array
+    solids: Deposits  # where they are
+    kept: Array  # (T, 2) share of its conductance that each side of a throat keeps
+    rows: tuple[Mapping[str, float], ...]  # one a step: time, rate, filtrate, solids, cake
+    by_class: Array  # (S, 3, C) m3 inside, passed and in the cake at each of these steps
+    # "plugged", "duration", "supply_exhausted" or "cap"; "" where it is not asked
     stop_reason: str = ""
 
 

@@ -16,31 +16,18 @@ from fdnet.spheres.snapshot import Array, one_line
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Streams:
-    """The directed links (K) of one flow through pores (N); links stand by their first pore.
+    """The directed links (K) of one flow through pores (N); links stand by their first pore."""
 
-    Attributes:
-        order: (N,) pores, by falling pressure.
-        first: (N+1,) the first of the links out of each pore.
-        source: (K,) pore that a link leaves.
-        target: (K,) pore that it enters.
-        link: (K,) its number among those that were given.
-        share: (K,) its flow over the inflow.
-        fed: (N,) share of the inflow that enters a pore from outside.
-        outlet: (N,) whether what enters a pore has left the specimen.
-        pressure: (N,) of the pores, over that lost in the specimen.
-        inflow: of that pressure, in the unit of the flow.
-    """
-
-    order: Array
-    first: Array
-    source: Array
-    target: Array
-    link: Array
-    share: Array
-    fed: Array
-    outlet: Array
-    pressure: Array
-    inflow: float
+    order: Array  # (N,) pores, by falling pressure
+    first: Array  # (N+1,) the first of the links out of each pore
+    source: Array  # (K,) pore that a link leaves
+    target: Array  # (K,) pore that it enters
+    link: Array  # (K,) its number among those that were given
+    share: Array  # (K,) its flow over the inflow
+    fed: Array  # (N,) share of the inflow that enters a pore from outside
+    outlet: Array  # (N,) whether what enters a pore has left the specimen
+    pressure: Array  # (N,) of the pores, over that lost in the specimen
+    inflow: float  # of that pressure, in the unit of the flow
 
     __repr__ = one_line
 
@@ -93,13 +80,7 @@ class Swept(NamedTuple):
 
 
 def carry(
-    streams: Streams,
-    filtrate: float,
-    *,
-    void: Array,
-    inside: Array,
-    feed: Array,
-    holds: Array,
+    streams: Streams, filtrate: float, *, void: Array, inside: Array, feed: Array, holds: Array
 ) -> Swept:
     """The concentrations after `filtrate` m3 of fluid have entered.
 

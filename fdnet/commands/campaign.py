@@ -100,20 +100,11 @@ def _run_campaign(
         way = f"would run in {options.out}: {how.jobs} at a time, by {by}"
         print(*plan_lines(plan), way, sep="\n")
         return 0
-    comparison = carry_out(
-        Path(options.out),
-        plan,
-        how,
-        options.rank_by,
-        run=not options.gather,
-    )
+    comparison = carry_out(Path(options.out), plan, how, options.rank_by, run=not options.gather)
     return _finish(options, comparison, limits)
 
 
-# ------------------------------------------------------------------------------------------------
-# The commands.
-
-
+# ---- The commands.
 def add_campaign_commands(commands: Any) -> None:
     """Adds `fdnet ensemble`, `sweep` and `compare` to the command line."""
     about = "run one case with several seeds, and give every number with its 95 % band"

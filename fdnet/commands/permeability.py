@@ -120,10 +120,7 @@ def _types(text: str) -> dict[int, str]:
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# What the command does and prints.
-
-
+# ---- What the command does and prints.
 PROFILE_BINS = 32
 _LARGE_FINE = 0.5
 """Part of the smallest grain's radius up to which spheres of type 2 are fines unasked."""

@@ -46,10 +46,7 @@ def add_case_commands(commands: Any) -> None:
     render.share("case", "--seed", "--set", "--np", "--out")
 
 
-# ------------------------------------------------------------------------------------------------
-# `fdnet check`: what is odd about a case, what to do about it, and what the run takes.
-
-
+# ---- `fdnet check`: what is odd about a case, what to do about it, and what the run takes.
 def _check(options: argparse.Namespace) -> int:
     result = looked_at(case_of(options))
     print(json.dumps(result.data(), indent=2) if options.json else "\n".join(result.lines()))
@@ -75,10 +72,7 @@ def _refuse_refused(result: "Checked") -> None:
             raise CaseError(f"fdnet run refuses this case: {one.what}")
 
 
-# ------------------------------------------------------------------------------------------------
-# `fdnet run --dry-run` prints the scales; `fdnet render` writes the decks too.
-
-
+# ---- `fdnet run --dry-run` prints the scales; `fdnet render` writes the decks too.
 def _render(options: argparse.Namespace) -> int:
     from fdnet.dem.invade_deck import render_decks
     from fdnet.run.folder import is_run_folder
@@ -111,10 +105,7 @@ def _print_scales(case: Any) -> "Checked":
     return result
 
 
-# ------------------------------------------------------------------------------------------------
-# `fdnet run`: pack, invade, analyse and report one case.
-
-
+# ---- `fdnet run`: pack, invade, analyse and report one case.
 def _run(options: argparse.Namespace) -> int:
     from fdnet.report.text import seconds_line, summary_lines
     from fdnet.run.pipeline import run_stages

@@ -263,10 +263,7 @@ def read_history(folder: Path, kind: type = Checkpoint) -> tuple[Any, ...]:
     return rows
 
 
-# ------------------------------------------------------------------------------------------------
-# When an invasion ends, in chunks.
-
-
+# ---- When an invasion ends, in chunks.
 def chunks_of(case: InvasionCase, scales: InvasionScales) -> int:
     """Number of chunks of the whole run: nearest to its duration, or enough to reach the cap."""
     chunks = scales.cap_time / (scales.checkpoint_steps * scales.time_step)
@@ -383,10 +380,7 @@ def steps_after(case: InvasionCase, steps: int, overlap: float, before: float = 
     return math.ceil(steps * min(MOST_RAISE, (overlap / (RAISE_TO * PRESSED)) ** power))
 
 
-# ------------------------------------------------------------------------------------------------
-# The states of checkpoints, from their dumps.
-
-
+# ---- The states of checkpoints, from their dumps.
 def entered_by(case: InvasionCase, batches: Batches, row: Checkpoint) -> int:
     """Batches of fines that had entered by a checkpoint.
 
@@ -556,10 +550,7 @@ def overlap_text(case: Case, deepest: Deepest, stiffness: float) -> str:
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# The record of updates of a coupled stage, updates.csv: one row for each.
-
-
+# ---- The record of updates of a coupled stage, updates.csv: one row for each.
 class Updates:
     """The rows of updates.csv; new ones are appended to the file at once.
 

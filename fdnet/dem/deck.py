@@ -286,10 +286,7 @@ def forces_left_out(case: InvasionCase) -> list[LeftOut]:
     return [LeftOut(what, why) for what, why, left in reasons if left]
 
 
-# ------------------------------------------------------------------------------------------------
-# What both scenes share in a deck: header, walls, and the data file of spheres.
-
-
+# ---- What both scenes share in a deck: header, walls, and the data file of spheres.
 def header_variables(
     case: Case, stage: str, left_out: list[LeftOut], ranks: int
 ) -> dict[str, Any]:

@@ -228,10 +228,7 @@ def write_parts(
     checkpoint.write_watch_parts(case, grains, folder)
 
 
-# ------------------------------------------------------------------------------------------------
-# The decks in which fines move among grains.
-
-
+# ---- The decks in which fines move among grains.
 def _margin(case: InvasionCase, scales: InvasionScales) -> float:
     """How far a fine could go in one chunk at twice its free velocity, plus two diameters, m."""
     travel = 2 * scales.drift_velocity * scales.checkpoint_steps * scales.time_step
@@ -365,10 +362,7 @@ def _left_out(
     return [LeftOut(what, why) for what, why, left in reasons if left]
 
 
-# ------------------------------------------------------------------------------------------------
-# Decks without LIGGGHTS.
-
-
+# ---- Decks without LIGGGHTS.
 def render_decks(case: Case, out: Path, *, ranks: int = 1) -> list[Path]:
     """Write the decks of a case without LIGGGHTS: the pack with its data file, and the invasion.
 

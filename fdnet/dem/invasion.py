@@ -242,10 +242,7 @@ class EndedStage:
     step_s: float  # s, time step
 
 
-# ------------------------------------------------------------------------------------------------
-# The invasion: fines are driven into the pack until it is plugged.
-
-
+# ---- The invasion: fines are driven into the pack until it is plugged.
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Invasion(EndedStage):
     """A finished invasion; `stop_reason` is also "plugged", "supply_exhausted", "mud_cut_off",

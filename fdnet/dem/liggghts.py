@@ -45,10 +45,7 @@ def environment(ranks: int) -> dict[str, str]:
     return own | _ALWAYS | _ALONE
 
 
-# ------------------------------------------------------------------------------------------------
-# Whether a run of LIGGGHTS really finished; its exit code 0 alone proves nothing.
-
-
+# ---- Whether a run of LIGGGHTS really finished; its exit code 0 alone proves nothing.
 END_MARK = "DECK_DONE"
 """The last line that a deck prints."""
 SCREEN = "screen.txt"
@@ -106,10 +103,7 @@ def _advice(bad: list[str]) -> str:
     return "mend the cause and continue with --resume"
 
 
-# ------------------------------------------------------------------------------------------------
-# A process of LIGGGHTS: how it is started, watched over and stopped.
-
-
+# ---- A process of LIGGGHTS: how it is started, watched over and stopped.
 LOCK_PATIENCE = 20.0
 """Seconds to wait for processes of an earlier run to end."""
 MOST_BYTES = 1 << 29
@@ -182,10 +176,7 @@ def started(
         os.close(lock)
 
 
-# ------------------------------------------------------------------------------------------------
-# The LIGGGHTS binary: where it is, which version it has, and how it is called.
-
-
+# ---- The LIGGGHTS binary: where it is, which version it has, and how it is called.
 KNOWN_VERSION = "3.8.0"
 """The version that fdnet was measured and tested with."""
 LOG = "log.liggghts"

@@ -140,10 +140,7 @@ def render_pack(case: Case, *, count: int) -> Deck:
     return Deck(text, tuple(left_out))
 
 
-# ------------------------------------------------------------------------------------------------
-# Packs are made until one has the porosity that is asked for.
-
-
+# ---- Packs are made until one has the porosity that is asked for.
 POROSITY_TOLERANCE = 0.003
 """Accepted difference to the porosity of the case."""
 ATTEMPTS = 8

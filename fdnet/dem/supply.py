@@ -230,10 +230,7 @@ def batches_of(case: InvasionCase, scales: InvasionScales) -> Batches:
     return Batches(counts=tuple(int(count) for count in counts), length=length, travel=travel)
 
 
-# ------------------------------------------------------------------------------------------------
-# Fines of measured sizes: which radius and density each has, and in which batch it comes.
-
-
+# ---- Fines of measured sizes: which radius and density each has, and in which batch it comes.
 class Drawn(NamedTuple):
     """Radius, m, and density, kg/m3, of some fines, (N,) each."""
 

@@ -291,10 +291,7 @@ def _release(run: FinishedRun, length: float, notes: list[str]) -> dict[str, Any
     return {"released": share, "release_rate": 1 / (run.porosity_initial * length)}
 
 
-# ------------------------------------------------------------------------------------------------
-# The fit over what it comes from.
-
-
+# ---- The fit over what it comes from.
 def draw_fit(handed: Sequence[HandedUp], path: Path) -> Path:
     """Deposit by depth and k / k0 of the sections, measured and by the model; of each run."""
     return draw(path, partial(_fill, handed=handed))

@@ -26,18 +26,12 @@ _LANDED = 1e-10
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Column:
-    """The way of the flow, straight or outwards from a well, in J cells.
+    """The way of the flow, straight or outwards from a well, in J cells."""
 
-    Attributes:
-        edges: (J+1,) m, depths from the face, 0 first.
-        area: m2, of the face.
-        well: m, radius of the face; infinite for a straight core.
-        outer: m, depth where the pressure is held; sound rock lies between the last edge and it.
-    """
-
-    edges: Array
-    area: float
-    well: float = math.inf
+    edges: Array  # (J+1,) m, depths from the face, 0 first
+    area: float  # m2, of the face
+    well: float = math.inf  # m, radius of the face; infinite for a straight core
+    # m, depth where the pressure is held; sound rock lies between the last edge and it
     outer: float = 0.0
 
     @property
@@ -74,32 +68,26 @@ class FineClass(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Medium:
-    """A rock and a mud as the model knows them, SI units.
+    """A rock and a mud as the model knows them, SI units."""
 
-    Attributes:
-        porosity, permeability: of sound rock.
-        damage, power: a deposit s leaves permeability / (1 + damage s)^power.
-        viscosity, mud: of the fluid, Pa s, and its classes.
-        closing: deposit of the face at which it closes; 0: at once, infinite: never.
-        cake_porosity, cake_permeability: of what the solids build on the closed face; without a
-            permeability nothing is known from then on.
-        cake_shape: as `cake_skin` names it.
-        released: share of the deposit that back-flow can take away.
-        release_rate: 1/m, how fast it decays with the back-flow over the area.
-    """
-
+    # porosity, permeability: of sound rock
     porosity: float
     permeability: float
+    # damage, power: a deposit s leaves permeability / (1 + damage s)^power
     damage: float = 0.0
     power: float = 2.0
+    # viscosity, mud: of the fluid, Pa s, and its classes
     viscosity: float = 1e-3
     mud: tuple[FineClass, ...] = ()
+    # deposit of the face at which it closes; 0: at once, infinite: never
     closing: float = math.inf
+    # cake_porosity, cake_permeability: of what the solids build on the closed face; without a
+    # permeability nothing is known from then on
     cake_porosity: float = 0.5
     cake_permeability: float | None = None
-    cake_shape: str = "linear"
-    released: float = 0.0
-    release_rate: float = 0.0
+    cake_shape: str = "linear"  # as `cake_skin` names it
+    released: float = 0.0  # share of the deposit that back-flow can take away
+    release_rate: float = 0.0  # 1/m, how fast it decays with the back-flow over the area
 
     @property
     def solids(self) -> float:
@@ -145,20 +133,16 @@ def damage_skin(column: Column, loss: Array) -> float:
 
 
 class Filled(NamedTuple):
-    """Where the fines of C classes are, in J cells.
+    """Where the fines of C classes are, in J cells."""
 
-    Attributes:
-        suspended, deposit, held: (C, J) volume of fines over that of fluid, over bulk volume, and
-            the part of this that back-flow cannot take.
-        face: deposit of all classes at the face itself.
-        cake, supplied, passed, returned: (C,) m3 in the cake, with the mud, out of the far end and
-            out of the face.
-    """
-
+    # suspended, deposit, held: (C, J) volume of fines over that of fluid, over bulk volume, and
+    # the part of this that back-flow cannot take
     suspended: Array
     deposit: Array
     held: Array
-    face: float
+    face: float  # deposit of all classes at the face itself
+    # cake, supplied, passed, returned: (C,) m3 in the cake, with the mud, out of the far end and
+    # out of the face
     cake: Array
     supplied: Array
     passed: Array
@@ -166,28 +150,19 @@ class Filled(NamedTuple):
 
 
 class March(NamedTuple):
-    """What `march` gives, at N moments, in S sections, for C classes.
+    """What `march` gives, at N moments, in S sections, for C classes."""
 
-    Attributes:
-        time, filtrate: (N,) s and m3 (what flowed in less what flowed back).
-        rate: (N,) m3/s.
-        parts: (N, S+2) Pa, lost in the cake, each section, and behind the sections.
-        k_over_k0: (N, S) of the sections.
-        effluent: (N, C) volume of fines over volume of fluid that leaves.
-        end: the last state.
-        closed_at: s, when the cake began first; None: never.
-        stopped: "" at the end of the drives; "closed" where the face closed and the cake is not
-            known, "full" where the cake filled the well.
-    """
-
+    # time, filtrate: (N,) s and m3 (what flowed in less what flowed back)
     time: Array
     filtrate: Array
-    rate: Array
-    parts: Array
-    k_over_k0: Array
-    effluent: Array
-    end: Filled
-    closed_at: float | None
+    rate: Array  # (N,) m3/s
+    parts: Array  # (N, S+2) Pa, lost in the cake, each section, and behind the sections
+    k_over_k0: Array  # (N, S) of the sections
+    effluent: Array  # (N, C) volume of fines over volume of fluid that leaves
+    end: Filled  # the last state
+    closed_at: float | None  # s, when the cake began first; None: never
+    # "" at the end of the drives; "closed" where the face closed and the cake is not known, "full"
+    # where the cake filled the well
     stopped: str
 
 

@@ -48,31 +48,19 @@ def voigt_average(tensor: Array) -> Moduli:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Elastic:
-    """Elastic behaviour of a pack for small strains.
+    """Elastic behaviour of a pack for small strains."""
 
-    Attributes:
-        tensor: (6, 6) stiffness, Pa, in the order xx, yy, zz, yz, xz, xy.
-        affine: (6, 6) the same with all grains held to the uniform strain: an upper bound.
-        density: of the dry pack, kg/m3.
-        coordination: mean number of joints with other grains, of a grain that carries.
-        grains: number of grains.
-        rattlers: grains that carry nothing.
-        contacts: joints that touch, those with walls among them.
-        bonds: bonded joints.
-        joints: all joints of the grains that carry; their indices count all grains.
-        motion: (6, N, 6) for each strain the displacement and rotation of each grain on top of
-            the uniform strain, m and rad.
-    """
-
-    tensor: Array
-    affine: Array
-    density: float
-    coordination: float
-    grains: int
-    rattlers: int
-    contacts: int
-    bonds: int
-    joints: Joints
+    tensor: Array  # (6, 6) stiffness, Pa, in the order xx, yy, zz, yz, xz, xy
+    affine: Array  # (6, 6) the same with all grains held to the uniform strain: an upper bound
+    density: float  # of the dry pack, kg/m3
+    coordination: float  # mean number of joints with other grains, of a grain that carries
+    grains: int  # number of grains
+    rattlers: int  # grains that carry nothing
+    contacts: int  # joints that touch, those with walls among them
+    bonds: int  # bonded joints
+    joints: Joints  # all joints of the grains that carry; their indices count all grains
+    # (6, N, 6) for each strain the displacement and rotation of each grain on top of the uniform
+    # strain, m and rad
     motion: Array
 
     __repr__ = one_line

@@ -79,10 +79,7 @@ def triaxial_warnings(result: Sheared) -> Iterator[str]:
         )
 
 
-# ------------------------------------------------------------------------------------------------
-# The material of a case's grains and bonds, and the moduli of its pack.
-
-
+# ---- The material of a case's grains and bonds, and the moduli of its pack.
 QUARTZ_YOUNG = 94.3e9
 """Young's modulus of quartz, Pa (Shi 2011, section 2.3.1)."""
 MANY_RATTLERS = 0.05

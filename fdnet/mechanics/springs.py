@@ -265,10 +265,7 @@ def bond_stress(force: Array, radius: Array) -> tuple[Array, Array]:
     return np.where(there, tension, 0.0), np.where(there, shear, 0.0)
 
 
-# ------------------------------------------------------------------------------------------------
-# Stiffness matrices of packs: assembled, and solved directly or by conjugate gradients.
-
-
+# ---- Stiffness matrices of packs: assembled, and solved directly or by conjugate gradients.
 LARGEST_DIRECT = 4000
 """Grains up to which the system is factored; larger ones are solved by conjugate gradients."""
 WITHIN, MOST_STEPS = 1e-10, 20_000

@@ -207,10 +207,7 @@ number_of: Any = intrinsic(_number_of)
 """The number of double precision that has these bits; for compiled functions only."""
 
 
-# ------------------------------------------------------------------------------------------------
-# Work on several processor cores at once, in the threads of this process.
-
-
+# ---- Work on several processor cores at once, in the threads of this process.
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 MOST_CORES = 8

@@ -271,10 +271,7 @@ def compare(
         measured.log = Log()
 
 
-# ------------------------------------------------------------------------------------------------
-# One call for spheres in plain arrays.
-
-
+# ---- One call for spheres in plain arrays.
 THINNEST = 1e-3
 """Least volume of spheres over that of their box that is no slip of units."""
 _DIGITS: Any = {"index": False, "float_format": "{:.4g}".format}

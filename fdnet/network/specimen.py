@@ -102,10 +102,7 @@ def cake_thickness(cake: Snapshot) -> float:
     return float(max(low - np.min(cake.position[:, 0] - cake.radius, initial=low), 0.0))
 
 
-# ------------------------------------------------------------------------------------------------
-# Whether an answer lies where the method was validated, and whether it can be true at all.
-
-
+# ---- Whether an answer lies where the method was validated, and whether it can be true at all.
 VALIDATED_POROSITY = (0.25, 0.50)
 """Lowest and highest porosity of the packs with a resolved permeability (docs: accuracy)."""
 SAND = (1e-6, 1e-2)
@@ -249,10 +246,7 @@ def empty_duct_permeability(box: Array, periodic: tuple[bool, bool, bool]) -> fl
     return height**2 / 12 * (1 - 192 * height / (np.pi**5 * width) * float(np.sum(terms)))
 
 
-# ------------------------------------------------------------------------------------------------
-# What a specimen is, before any law: its network, where its fines sit, its porosity by depth.
-
-
+# ---- What a specimen is, before any law: its network, where its fines sit, its porosity by depth.
 MOVED = 1e-9
 """A grain that is displaced by more than this, m, has moved."""
 

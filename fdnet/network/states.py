@@ -99,10 +99,7 @@ def refused_slabs(cut: Cut) -> tuple[str, ...]:
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# One state of a specimen: a network with its conductance, flow and permeability.
-
-
+# ---- One state of a specimen: a network with its conductance, flow and permeability.
 STAGES = ("tessellate", "occupancy", "conductance", "solve", "porosity")
 
 
@@ -305,10 +302,7 @@ def few_throats(flows: Sequence[Flow]) -> Iterator[str]:
         )
 
 
-# ------------------------------------------------------------------------------------------------
-# What the pairs of laws of one specimen share, each part computed once and when it is needed.
-
-
+# ---- What the pairs of laws of one specimen share, each part computed once and when it is needed.
 @dataclass(slots=True, eq=False, kw_only=True)
 class Measured:
     """A specimen, what has been computed of it so far, and the log of the present pair."""

@@ -358,10 +358,7 @@ def _mark(
                                 closest[a, b, c], nearest[a, b, c] = way, s
 
 
-# ------------------------------------------------------------------------------------------------
-# The preconditioner G of the wall forces, and sums (docs/theory/resolved_flow.md, 5).
-
-
+# ---- The preconditioner G of the wall forces, and sums (docs/theory/resolved_flow.md, 5).
 OWN_RESPONSE = 2.0 / 3.0 * 0.252731
 """Velocity of a node under a unit force on itself, which scales the unknowns: 2/3 of the lattice
 Green's function at 0 (Watson 1939)."""
@@ -565,10 +562,7 @@ def solve(
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# The reference of the pore network: permeability of a periodic cell or of a slab.
-
-
+# ---- The reference of the pore network: permeability of a periodic cell or of a slab.
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class StokesFlow:
     """A solved cell or slab."""

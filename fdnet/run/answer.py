@@ -25,10 +25,7 @@ class Step(NamedTuple):
     after: float  # m2, with fines
 
 
-# ------------------------------------------------------------------------------------------------
-# How deep the damage reaches and how much permeability is left there.
-
-
+# ---- How deep the damage reaches and how much permeability is left there.
 FACE = 2.0
 """Depth behind the face whose loss stands first in an answer, in median grains: a millimetre in
 the sand of the thesis."""
@@ -134,10 +131,7 @@ def layers_in_series(layers: Sequence[tuple[float, float]]) -> float:
     return sum(thick for thick, _ in layers) / sum(thick / k for thick, k in layers)
 
 
-# ------------------------------------------------------------------------------------------------
-# The skin of a damaged zone around a well, and the share of its flow that it costs.
-
-
+# ---- The skin of a damaged zone around a well, and the share of its flow that it costs.
 def hawkins(ratio: float, *, well: float, damaged: float) -> float:
     """Skin s = (k / k_d - 1) ln(r_d / r_w) (Hawkins 1956, Trans. AIME 207, 356-357).
 
@@ -274,10 +268,7 @@ def rules_of(
     return result
 
 
-# ------------------------------------------------------------------------------------------------
-# How much the answer of one seed differs from that of another, from published repeats.
-
-
+# ---- How much the answer of one seed differs from that of another, from published repeats.
 SOURCE = "docs/thesis/results.csv"
 
 
@@ -309,10 +300,7 @@ QUICK_GRAINS = 500
 """Number of grains below which a specimen is compared with the quick ones."""
 
 
-# ------------------------------------------------------------------------------------------------
-# The keys of summary.json that follow from its other results.
-
-
+# ---- The keys of summary.json that follow from its other results.
 def with_answer(
     summary: Mapping[str, Any], case: Case, analysis: "Analysis", spheres: Snapshot
 ) -> dict[str, Any]:

@@ -148,10 +148,7 @@ def _course(
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# The stage: what it writes, and its record.
-
-
+# ---- The stage: what it writes, and its record.
 def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) -> dict[str, Any]:
     """Let the mud in, write what is left of it into `folder`, and return the stage's record."""
     end = invade_classes(model.sieve, model.classes, model.course, model.flow)
@@ -215,25 +212,15 @@ def rows_of(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-# ------------------------------------------------------------------------------------------------
-# Volumes as counts of fines, and fines as spheres.
-
-
+# ---- Volumes as counts of fines, and fines as spheres.
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Counts:
-    """Fines of each class (C), in rows of `per_row` fines.
+    """Fines of each class (C), in rows of `per_row` fines."""
 
-    Attributes:
-        per_row: (C,) fines that a row stands for.
-        invaded: (C,) rows inside the specimen.
-        passed: (C,) rows that left through the outlet.
-        upstream: (C,) rows before the face.
-    """
-
-    per_row: Array
-    invaded: Array
-    passed: Array
-    upstream: Array
+    per_row: Array  # (C,) fines that a row stands for
+    invaded: Array  # (C,) rows inside the specimen
+    passed: Array  # (C,) rows that left through the outlet
+    upstream: Array  # (C,) rows before the face
 
     @property
     def supplied(self) -> Array:
@@ -319,22 +306,15 @@ def _before(model: ClassModel, count: int, solids: Deposits, rng: np.random.Gene
 
 
 class Rested(NamedTuple):
-    """Fines of one kind: where so many m3 rest in a specimen.
+    """Fines of one kind: where so many m3 rest in a specimen."""
 
-    Attributes:
-        name: of the kind.
-        concentration: volume over that of the mud.
-        depth, volume: (N,) m and m3, of each.
-        passed: m3 that got through the specimen.
-        number: of equal fines, or of pores, that would tell as much.
-    """
-
-    name: str
-    concentration: float
+    name: str  # of the kind
+    concentration: float  # volume over that of the mud
+    # depth, volume: (N,) m and m3, of each
     depth: Array
     volume: Array
-    passed: float
-    number: float
+    passed: float  # m3 that got through the specimen
+    number: float  # of equal fines, or of pores, that would tell as much
 
 
 def rested_classes(run: FinishedRun, case: InvasionCase) -> list[Rested]:
@@ -363,10 +343,7 @@ def rested_classes(run: FinishedRun, case: InvasionCase) -> list[Rested]:
     return found
 
 
-# ------------------------------------------------------------------------------------------------
-# The analysis of the specimen: that of its grains, with what the classes left.
-
-
+# ---- The analysis of the specimen: that of its grains, with what the classes left.
 def analysed_classes(
     model: ClassModel, kept: ClassInvasion, base: "Analysis", spheres: Snapshot
 ) -> "Analysis":
@@ -520,15 +497,9 @@ def _occupancy(
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# A finished run of the fast model.
-
-
+# ---- A finished run of the fast model.
 def finished_classes(
-    case: InvasionCase,
-    scales: InvasionScales,
-    grains: Snapshot,
-    folder: Path,
+    case: InvasionCase, scales: InvasionScales, grains: Snapshot, folder: Path
 ) -> tuple[FinishedInvasion, ClassModel, ClassInvasion]:
     """The invasion in `folder`, with its model and what the classes left."""
     model, kept = class_model(case, scales, grains), read_classes(folder / STATE)
@@ -557,11 +528,7 @@ def finished_classes(
         for row, own in zip(kept.rows, numbers, strict=True)
     ]
     done = FinishedInvasion(
-        case=case,
-        scales=scales,
-        history=(last,),
-        damaged=grains.joined(fines),
-        rows=tuple(rows),
+        case=case, scales=scales, history=(last,), damaged=grains.joined(fines), rows=tuple(rows)
     )
     return done, model, kept
 

@@ -58,10 +58,7 @@ def _speed(velocity: Array) -> Array:
     return np.linalg.norm(velocity, axis=1)
 
 
-# ------------------------------------------------------------------------------------------------
-# A fluid that flows the other way: the specimen is mirrored, asked, and mirrored back.
-
-
+# ---- A fluid that flows the other way: the specimen is mirrored, asked, and mirrored back.
 _TURN = np.array([-1.0, 1.0, 1.0])
 
 
@@ -95,10 +92,7 @@ def mirrored(spheres: Snapshot) -> Snapshot:
     return replace(spheres, position=position, velocity=spheres.velocity * _TURN)
 
 
-# ------------------------------------------------------------------------------------------------
-# What moving fines meet until they are looked at again: the mean over their way.
-
-
+# ---- What moving fines meet until they are looked at again: the mean over their way.
 PARTS = 4
 """Parts of the way; in each the fluid is taken half-way."""
 
@@ -154,10 +148,7 @@ def _wet(velocity: Array) -> Array:
     return np.any(velocity != 0.0, axis=1, keepdims=True)
 
 
-# ------------------------------------------------------------------------------------------------
-# The invasion over time as rows: the table history.csv of a run folder.
-
-
+# ---- The invasion over time as rows: the table history.csv of a run folder.
 FLOW_COLUMNS = (
     "rate_m3_s",
     "rate_over_initial",
@@ -203,10 +194,7 @@ def history_rows(
     return rows
 
 
-# ------------------------------------------------------------------------------------------------
-# The fluid: velocity, drag and pressure on each fine, and the rate of flow.
-
-
+# ---- The fluid: velocity, drag and pressure on each fine, and the rate of flow.
 STANDING = 0.5
 """A fine belongs to the deposit when it is slower than this share of the velocity given to it."""
 

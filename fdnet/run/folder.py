@@ -29,10 +29,7 @@ RECORDS: dict[str, str] = {stage: f"{stage}/stage.json" for stage in LIGGGHTS_ST
 _MARK_TEXT = "fdnet run folder, format 1\n"
 
 
-# ------------------------------------------------------------------------------------------------
-# Digests of the files that a stage made, kept in its record and checked before they are used.
-
-
+# ---- Digests of the files that a stage made, kept in its record and checked before they are used.
 TABLES = (
     "spheres_initial.csv",
     "spheres_damaged.csv",
@@ -121,10 +118,7 @@ def check_file(path: Path, digest: str, advice: str) -> None:
         )
 
 
-# ------------------------------------------------------------------------------------------------
-# The records of a run folder: of its finished stages, and the manifest of the whole run.
-
-
+# ---- The records of a run folder: of its finished stages, and the manifest of the whole run.
 OUTPUTS = {
     "pack": ("pack", "mechanics"),
     "invade": ("invade", "stokes"),
@@ -236,10 +230,7 @@ def check_finished(folder: Path) -> tuple[dict[str, Any], Case]:
     return manifest, case
 
 
-# ------------------------------------------------------------------------------------------------
-# A run folder: who may write into it, which stages are done, and when it is complete.
-
-
+# ---- A run folder: who may write into it, which stages are done, and when it is complete.
 def mark_folder(folder: Path) -> None:
     """Write the mark that makes `folder` a run folder, unless it is there."""
     if not _holds_mark(folder):

@@ -69,10 +69,7 @@ def colour_limits(values: Array) -> tuple[float, float]:
     return high / 10.0**DECADES, high
 
 
-# ------------------------------------------------------------------------------------------------
-# The movie of a finished run, or a picture of it before and after, from the states it kept.
-
-
+# ---- The movie of a finished run, or a picture of it before and after, from the states it kept.
 LEAST, MOST = 0.5, 30.0
 """Frames a second that a movie may have."""
 TITLE = "flux of a throat,\n% of the first flow"

@@ -143,10 +143,7 @@ def draw_figures(
     return captioned, [reason] if reason else []
 
 
-# ------------------------------------------------------------------------------------------------
-# Sizes of the spheres that a run placed, next to those that its case asks for.
-
-
+# ---- Sizes of the spheres that a run placed, next to those that its case asks for.
 def placed_sizes(
     case: Case, grains: Snapshot, damaged: Snapshot | None, supplied: int
 ) -> Iterator[PlacedSizes]:
@@ -207,10 +204,7 @@ def size_numbers(one: PlacedSizes) -> dict[str, Any]:
     return result
 
 
-# ------------------------------------------------------------------------------------------------
-# Results that only some runs have: cake, filtrate, bridging, and what the clean-up returns.
-
-
+# ---- Results that only some runs have: cake, filtrate, bridging, and what the clean-up returns.
 _CLEAN_UP_COLUMNS = (
     ("section", "section", "", None),
     ("x_lo_m", "from", "mm", 1e3),

@@ -30,13 +30,7 @@ from fdnet.run.by_classes import (
     spheres_at_the_end,
 )
 from fdnet.run.clean_up import clean_up_stage, compared, returned
-from fdnet.run.dem_stages import (
-    invade_stage,
-    invaded,
-    invasion_record,
-    pack_stage,
-    packed_grains,
-)
+from fdnet.run.dem_stages import invade_stage, invaded, invasion_record, pack_stage, packed_grains
 from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import (
     RECORDS,
@@ -55,13 +49,7 @@ from fdnet.run.outputs import (
     write_paraview,
     write_tables,
 )
-from fdnet.run.records import (
-    RunOptions,
-    Session,
-    cores,
-    finer_file,
-    stage_costs,
-)
+from fdnet.run.records import RunOptions, Session, cores, finer_file, stage_costs
 from fdnet.run.stokes_sections import report_section
 from fdnet.run.summary import summarise
 from fdnet.scales.cost import over_limit
@@ -385,10 +373,7 @@ def with_default_laws(
 
 
 def _write_page(
-    session: Session,
-    results: Results,
-    summary: dict[str, Any],
-    figures: list[tuple[Path, str]],
+    session: Session, results: Results, summary: dict[str, Any], figures: list[tuple[Path, str]]
 ) -> None:
     case, command = session.case, session.options.command
     parts = html.ReportParts(

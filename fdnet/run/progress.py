@@ -16,10 +16,7 @@ ONE_CORE: Mapping[str, str] = MappingProxyType(dict.fromkeys(_THREADS, "1"))
 """What numpy, scipy and numba read when they are loaded, for a process that works on one core."""
 
 
-# ------------------------------------------------------------------------------------------------
-# When a stage ends, from what is known before it and from what its screen says.
-
-
+# ---- When a stage ends, from what is known before it and from what its screen says.
 QUIET_SHARE, LEAST_LEFT, GROWTH = 0.3, 0.05, 0.4
 """Part of the plug time without crossings from which the stop rule is expected to hold; least
 part of it that is left; and steps that are expected beyond the forecast, over those done."""
@@ -61,10 +58,7 @@ class Forecast:
         return max(step, round(min(most, end)))
 
 
-# ------------------------------------------------------------------------------------------------
-# Progress of a run of LIGGGHTS: a live bar on a terminal, elsewhere a line every few seconds.
-
-
+# ---- Progress of a run of LIGGGHTS: a live bar on a terminal, elsewhere a line every few seconds.
 _THERMO = re.compile(r"^\s*(\d+)\s+\d+\s+[-+.\deE]+\s+[-+.\deE]+\s*$")
 _QUIET_SECONDS = 5.0
 _NOTES = {

@@ -241,10 +241,7 @@ class FinishedInvasion:
     rows: tuple[dict[str, float], ...] = ()
 
 
-# ------------------------------------------------------------------------------------------------
-# One session of a run: what is run, where, and how long each stage took.
-
-
+# ---- One session of a run: what is run, where, and how long each stage took.
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunOptions:
     """How to run a case, as opposed to what it is: the options of `fdnet run`."""
@@ -347,10 +344,7 @@ class Session:
         self.folder.finish(stage, own | record)
 
 
-# ------------------------------------------------------------------------------------------------
-# A pack that several runs share: made once, and copied into each of them.
-
-
+# ---- A pack that several runs share: made once, and copied into each of them.
 def take_pack(session: Session, source: Path) -> None:
     """Copy the finished pack of the run folder `source`, as if this run had made it.
 

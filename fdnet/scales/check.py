@@ -67,10 +67,7 @@ def width_error(width: float, *, periodic: bool) -> float:
     return float(np.interp(np.log(width), np.log(widths), errors))
 
 
-# ------------------------------------------------------------------------------------------------
-# What is odd about the sizes and the supply of a case.
-
-
+# ---- What is odd about the sizes and the supply of a case.
 MOST_WIDTH_ERROR = 0.10
 """Error of the permeability by the width of the specimen, from which it is named."""
 LEAST_LENGTH = 3.0
@@ -200,10 +197,7 @@ def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Fin
         )
 
 
-# ------------------------------------------------------------------------------------------------
-# A case looked at: all that is odd, and what the run takes.
-
-
+# ---- A case looked at: all that is odd, and what the run takes.
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Checked:
     """What is odd about a case, and what it takes."""

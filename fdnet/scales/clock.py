@@ -57,10 +57,7 @@ def present_share(case: InvasionCase, *, duration: float, feeding: float) -> flo
     return 1 - 0.5 * (1 - FIRST_BATCHES) * full / duration
 
 
-# ------------------------------------------------------------------------------------------------
-# Times in words.
-
-
+# ---- Times in words.
 def spoken_time(seconds: float) -> str:
     """A time as one says it: "40 s", "12 min", "3 h 20 min", "2.1e+03 h (2.4 years)"."""
     minutes = seconds / 60
@@ -76,10 +73,7 @@ def spoken_time(seconds: float) -> str:
     return f"{hours:.2g} h ({years:.2g} years)" if years > 1 else f"{hours:.0f} h"
 
 
-# ------------------------------------------------------------------------------------------------
-# The slab of suspension that is supplied: how many fines, how long, how often one arrives.
-
-
+# ---- The slab of suspension that is supplied: how many fines, how long, how often one arrives.
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Slab:
     """The suspension upstream of the formation face."""
@@ -135,10 +129,7 @@ def slab_warnings(case: InvasionCase, slab: Slab) -> list[Doubt]:
     return [] if slab.length > diameter else [Doubt("slab-lengthened", text)]
 
 
-# ------------------------------------------------------------------------------------------------
-# When an invasion ends, and how often it is looked at until then.
-
-
+# ---- When an invasion ends, and how often it is looked at until then.
 ARRIVALS = 10
 """The default plug time lets at least this many fines of the undisturbed suspension arrive."""
 
@@ -326,10 +317,7 @@ def drag_warnings(case: Case, held: float) -> list[Doubt]:
     return [Doubt("drag-held", text)]
 
 
-# ------------------------------------------------------------------------------------------------
-# How fast the simulation is driven, how deep it presses fines, and the stiffness it needs.
-
-
+# ---- How fast the simulation is driven, how deep it presses fines, and the stiffness it needs.
 PRESSED = 0.03
 """Largest predicted overlap of a fine over its diameter with `run.stiffness_N_m` = "auto"."""
 

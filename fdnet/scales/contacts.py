@@ -321,10 +321,7 @@ def _effective_mass(case: Case, pair: tuple[str, str]) -> float:
     return 1 / sum(1 / sphere_mass(one.mean_radius_m, one.mean_density_kg_m3) for one in free)
 
 
-# ------------------------------------------------------------------------------------------------
-# How deep fines are pressed into grains, as predicted: by impact, by drag, in a deposit.
-
-
+# ---- How deep fines are pressed into grains, as predicted: by impact, by drag, in a deposit.
 MOST_OVERLAP = 0.5
 """Predicted overlap over a fine's diameter from which a case is refused: beyond it a fine could
 pass through a grain."""

@@ -5,20 +5,9 @@ from dataclasses import dataclass
 
 from fdnet.case.case import Case, InvasionCase
 from fdnet.names import MOST_SPHERES
-from fdnet.scales.clock import (
-    TAKEN_SOLIDS,
-    contact_step,
-    present_share,
-    spoken_time,
-    step_factor,
-)
+from fdnet.scales.clock import TAKEN_SOLIDS, contact_step, present_share, spoken_time, step_factor
 from fdnet.scales.drag import BRIDGING
-from fdnet.scales.pack import (
-    PACK_RELAX_STEPS,
-    PACK_STAGE_STEPS,
-    PACK_STAGES,
-    grain_count,
-)
+from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, grain_count
 from fdnet.scales.scales import InvasionScales, Scales
 
 STEP_SECONDS = 2.0e-6

@@ -88,10 +88,7 @@ def _curve(group: str, answers: Answers) -> dict[str, Any]:
     return {name: texts[f"{group}_{name.lower()}"] for name in ("D10", "D50", "D90")}
 
 
-# ------------------------------------------------------------------------------------------------
-# What fdnet chooses for a case, and the tables of the case file.
-
-
+# ---- What fdnet chooses for a case, and the tables of the case file.
 class Budget(NamedTuple):
     """How large a specimen may be, and how long it may take."""
 
@@ -174,10 +171,7 @@ def um(length: float) -> str:
     return f"{1e6 * length:.3g} um"
 
 
-# ------------------------------------------------------------------------------------------------
-# How large a specimen and how much mud a sand and a mud need, and what of them fits a budget.
-
-
+# ---- How large a specimen and how much mud a sand and a mud need, and what of them fits a budget.
 SECTION = 2.0
 """Thickness of a section in mean grain diameters."""
 SAND_CUTS = (1.0, 2.0, 5.0, 10.0)
@@ -347,10 +341,7 @@ def _up(length: float) -> float:
     return step * math.ceil(length / step - 1e-9)
 
 
-# ------------------------------------------------------------------------------------------------
-# The case file of a design, with the reason next to each value.
-
-
+# ---- The case file of a design, with the reason next to each value.
 def case_text(design: Design) -> str:
     """A case file that reads as the case of the design."""
     tables, notes = tables_of(design.answers, design.choice), _notes(design)

@@ -254,10 +254,7 @@ def pore_width(porosity: float, diameter: float) -> float:
     return 2 * diameter * porosity / (3 * (1 - porosity))
 
 
-# ------------------------------------------------------------------------------------------------
-# What is doubtful about the forces of the fluid on the fines, in words.
-
-
+# ---- What is doubtful about the forces of the fluid on the fines, in words.
 BRIDGING = 0.5
 """Largest fine over the width of the throats, above which geometry decides where fines stop."""
 

@@ -66,10 +66,7 @@ def radial(radius: float, outer: float) -> Path:
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# The velocity of the fluid at the formation face: given, or driven by the overbalance.
-
-
+# ---- The velocity of the fluid at the formation face: given, or driven by the overbalance.
 INERTIA_WARNING = 0.05
 """Share of Darcy's velocity that inertia takes, from which "darcy" warns."""
 USUAL_WELL = (0.108, 100.0)

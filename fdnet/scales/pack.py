@@ -93,10 +93,7 @@ def close_packing(curve: SizeCurve) -> float:
     return math.fsum(rods) / (math.fsum(rods) + total_gap)
 
 
-# ------------------------------------------------------------------------------------------------
-# The measured sizes of a case: diameters of its curves, and what these miss and leave out.
-
-
+# ---- The measured sizes of a case: diameters of its curves, and what these miss and leave out.
 SHARES = (0.1, 0.5, 0.9)
 """Shares by volume whose diameters are shown: D10, D50 and D90."""
 MOST_TAIL = 0.02
@@ -165,10 +162,7 @@ def size_warnings(case: Case) -> Iterator[Doubt]:
             )
 
 
-# ------------------------------------------------------------------------------------------------
-# The pack of grains in closed form: its porosity, the number of grains, and how it is grown.
-
-
+# ---- The pack of grains in closed form: its porosity, the number of grains, and how it is grown.
 PACK_STAGES, PACK_STAGE_STEPS, PACK_RELAX_STEPS, PACK_START, PACK_STEP = 30, 300, 20_000, 0.6, 0.15
 """Growth of a pack: number of stages and steps in each, steps of the first relaxation, radius at
 the start over the final one, time step over sqrt(m/k)."""

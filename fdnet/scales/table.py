@@ -7,12 +7,7 @@ from importlib.resources import files
 from typing import Any, NamedTuple
 
 from fdnet.case.case import Case, InvasionCase
-from fdnet.scales.contacts import (
-    LARGEST_CHAIN,
-    Contact,
-    least_restitution,
-    pull_off_of,
-)
+from fdnet.scales.contacts import LARGEST_CHAIN, Contact, least_restitution, pull_off_of
 from fdnet.scales.cost import cost_of, peak_memory
 from fdnet.scales.drag import MOST_RATIO, held_factor
 from fdnet.scales.pack import SHARES, curves_of, diameter_at, grain_count

@@ -148,10 +148,7 @@ def _float(text: str, *, comma: bool) -> float | None:
         return None
 
 
-# ------------------------------------------------------------------------------------------------
-# Spheres of a LIGGGHTS or LAMMPS text dump.
-
-
+# ---- Spheres of a LIGGGHTS or LAMMPS text dump.
 DUMP_UNITS = {"si": 1.0, "cgs": 1e-2, "micro": 1e-6}
 """Metres in the unit of length of the unit systems that a dump may name."""
 _MOST_NAMED, _MOST_SHOWN = 5, 40
@@ -230,10 +227,7 @@ def _chosen(heads: list[Head], cut: list[DumpError], source: str, step: int | No
     return chosen[-1]
 
 
-# ------------------------------------------------------------------------------------------------
-# Spheres from a file of any known format, with grains distinguished from fines.
-
-
+# ---- Spheres from a file of any known format, with grains distinguished from fines.
 _START = 1000
 """Bytes at the start of a file that tell its format."""
 _SAME_BOX = 1e-6

@@ -42,10 +42,7 @@ def _short(value: Any) -> str:
     return f"{len(value)} items" if many else f"{type(value).__name__}(...)"
 
 
-# ------------------------------------------------------------------------------------------------
-# Units of length, and the axes x, y, z, given by letters or as truth values.
-
-
+# ---- Units of length, and the axes x, y, z, given by letters or as truth values.
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 """Metres in each unit of length that spheres may be given in."""
 
@@ -90,10 +87,7 @@ def sides_of(spheres: "Snapshot", periodic: Directions | None) -> tuple[bool, bo
     return periodic_axes(periodic)
 
 
-# ------------------------------------------------------------------------------------------------
-# All spheres of a specimen at one step, in SI units.
-
-
+# ---- All spheres of a specimen at one step, in SI units.
 class Kind(IntEnum):
     """What a sphere is; the number is its LIGGGHTS atom type."""
 

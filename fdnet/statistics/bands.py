@@ -12,19 +12,12 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
-    """A mean and its 95 % band.
+    """A mean and its 95 % band."""
 
-    Attributes:
-        mean: the mean.
-        low: lower end of the band; nan where the spread is not known.
-        high: upper end of the band; nan where the spread is not known.
-        cut: bounds of the quantity at which the band was cut.
-    """
-
-    mean: float
-    low: float
-    high: float
-    cut: tuple[float, ...] = ()
+    mean: float  # the mean
+    low: float  # lower end of the band; nan where the spread is not known
+    high: float  # upper end of the band; nan where the spread is not known
+    cut: tuple[float, ...] = ()  # bounds of the quantity at which the band was cut
 
     @property
     def half_width(self) -> float:

@@ -22,19 +22,14 @@ _SAME = 1e-12
 
 
 class Difference(NamedTuple):
-    """How two samples of a quantity differ.
+    """How two samples of a quantity differ."""
 
-    Attributes:
-        band: mean of the one less that of the other, with its 95 % band.
-        paired: whether values of the same seed were compared.
-        p_value: chance of a difference as large between equal quantities; nan of one seed each.
-        seeds_needed: seeds of each that show a difference of this size with a chance of 80 %;
-            None when more than MOST_SEEDS.
-    """
-
-    band: Band
-    paired: bool
+    band: Band  # mean of the one less that of the other, with its 95 % band
+    paired: bool  # whether values of the same seed were compared
+    # chance of a difference as large between equal quantities; nan of one seed each
     p_value: float
+    # seeds of each that show a difference of this size with a chance of 80 %; None when more than
+    # MOST_SEEDS
     seeds_needed: int | None
 
 

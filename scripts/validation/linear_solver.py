@@ -42,17 +42,11 @@ TILE, SHAKE, LAW, PORES_PER_GRAIN, DIGITS = "packH_40_eps40", 0.02, "lubrication
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Circuit:
-    """Links between pores and the two planes.
+    """Links between pores and the two planes."""
 
-    Attributes:
-        ends: (K, 2) nodes that a link joins.
-        conductance: (K,) of the links, in any one unit.
-        count: number of pores.
-    """
-
-    ends: Array
-    conductance: Array
-    count: int
+    ends: Array  # (K, 2) nodes that a link joins
+    conductance: Array  # (K,) of the links, in any one unit
+    count: int  # number of pores
 
     def out_of(self, flux: Array, plane: int) -> float:
         """Flux (from first to second end) out of the inlet plane (0) or the outlet plane (1)."""

@@ -54,31 +54,18 @@ Seen = Mapping[str, float]
 
 
 class Push(NamedTuple):
-    """What acts on the fines, and how long they are followed.
+    """What acts on the fines, and how long they are followed."""
 
-    Attributes:
-        step: time step, s.
-        steps: of a chunk, after which the kinetic energy is looked at.
-        chunks: most chunks.
-        force: constant, on every fine, N.
-        damping: viscous drag on every fine, N s/m.
-        settle: steps before the first chunk, after which the fines are seen once.
-        every: steps from one look at the fines to the next; 0 for the end alone.
-        rest: kinetic energy, J, below which the run ends.
-        boundary: of the box, as LIGGGHTS names it.
-        floor: whether a rough plane x = 0 holds the fines.
-    """
-
-    step: float
-    steps: int
-    chunks: int = 1
-    force: tuple[float, ...] = (0.0, 0.0, 0.0)
-    damping: float = 0.0
-    settle: int = 0
-    every: int = 0
-    rest: float = 0.0
-    boundary: str = "f f f"
-    floor: bool = False
+    step: float  # time step, s
+    steps: int  # of a chunk, after which the kinetic energy is looked at
+    chunks: int = 1  # most chunks
+    force: tuple[float, ...] = (0.0, 0.0, 0.0)  # constant, on every fine, N
+    damping: float = 0.0  # viscous drag on every fine, N s/m
+    settle: int = 0  # steps before the first chunk, after which the fines are seen once
+    every: int = 0  # steps from one look at the fines to the next; 0 for the end alone
+    rest: float = 0.0  # kinetic energy, J, below which the run ends
+    boundary: str = "f f f"  # of the box, as LIGGGHTS names it
+    floor: bool = False  # whether a rough plane x = 0 holds the fines
 
 
 def case_of(stiffness: float, *settings: str, fine: float = FINE) -> InvasionCase:

@@ -523,15 +523,18 @@ def judge_11(rows: pd.DataFrame) -> list[Finding]:
 LATER = "cannot be tried yet: needs the network's size classes"
 BEADS = {"plug": ((0.177, 0.210), 900.0), "plateau": ((0.250, 0.297), 450.0)}
 """Sieves of the sand, mm, and pressure gradient, kPa/m, by what was seen."""
+COLLOIDS = ((0.5, 0.501), 10.0), (0.004, 0.050)
+"""The same for row 5, with solids of 0.008 to 0.1 of a grain, mm."""
 
 
 def beads(trial: Trial) -> Seen:
     """k/k0 of 4 mm of sand, and its first quarter's share of the deposit.
 
-    Twenty pore volumes of water bring half a percent of beads of 5 to 10 um at constant pressure,
-    as size classes on the network. The concentration of the experiment is not known to us.
+    Twenty pore volumes of water bring half a percent of solids at constant pressure, as size
+    classes on the network. The concentration of the experiment is not known to us.
     """
-    (low, high), gradient = BEADS[trial.value]
+    colloids = trial.value == "colloids"
+    (low, high), gradient = COLLOIDS[0] if colloids else BEADS[trial.value]
     length, side = 4.0, 2.5 * (low + high)
     sieved = {"cut_percent": [0.0, 100.0], "passing_percent": [0.0, 100.0]}
     tables = {
@@ -540,7 +543,7 @@ def beads(trial: Trial) -> Seen:
         "box": {"size_mm": [length, side, side], "sides": "periodic"},
         "grains": {"sizes": {**sieved, "size_mm": [low, high]}, "porosity": 0.38},
         "fines": {
-            "sizes": {**sieved, "size_mm": [0.005, 0.010]},
+            "sizes": {**sieved, "size_mm": COLLOIDS[1] if colloids else [0.005, 0.010]},
             "concentration": 0.005,
             "slab_mm": 20 * 0.38 * length,
         },
@@ -595,13 +598,15 @@ def judge_rate(rows: pd.DataFrame) -> list[Finding]:
 
 
 def judge_strained(rows: pd.DataFrame) -> list[Finding]:
-    """Row 5 by the fines of row 1: smooth spheres that do not stick wedge between three grains."""
-    held = shares(rows, "equal, friction 0.5, ").get(7.0)
-    if held is None:
+    """Row 5 by size classes, and by the fines of row 1: smooth spheres that do not stick."""
+    held = shares(rows[rows.comparison == "1"], "equal, friction 0.5, ").get(7.0)
+    own = rows[(rows.comparison == "5") & (rows.quantity == "k over k0")].observed
+    if held is None or own.empty:
         return []
-    what = "5: straining of colloids by d/D"
+    seen = f"k/k₀ {own.mean():.2f} with 0.008 to 0.1; "
+    seen += f"{held[0]} of {held[1]:,} held at 1/7 in {LENGTHS['equal'][0]:g} mm"
     number = "none below 0.008, linear above"
-    seen = f"{held[0]} of {held[1]:,} held at 1/7 in {LENGTHS['equal'][0]:g} mm"
+    what = "5: straining of colloids by d/D"
     return [Finding(what, number, "Xu and others 2006", seen, math.inf)]
 
 

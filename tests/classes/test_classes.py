@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 
 from fdnet.case.spheres import Fines
-from fdnet.classes.capture import (
-    Bed,
-    SizeClasses,
-    collector_efficiency,
-    mud_classes,
-    wider_share,
-)
+from fdnet.classes.capture import Bed, SizeClasses, collector_efficiency, mud_classes, wider_share
 from fdnet.classes.deposit import (
     Release,
     Sieve,

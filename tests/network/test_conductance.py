@@ -5,10 +5,7 @@ import pytest
 
 from fdnet.network.flow.sections import whole_permeability
 from fdnet.network.laws import deposit_resistances as deposit
-from fdnet.network.laws.deposit_resistances import (
-    bounded_by_fines,
-    deposit_resistances,
-)
+from fdnet.network.laws.deposit_resistances import bounded_by_fines, deposit_resistances
 from fdnet.network.laws.lubrication import half_resistances
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import build_network

@@ -7,13 +7,7 @@ from fdnet.errors import FlowError
 from fdnet.network.flow import solver
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.flow.sections import inplace_permeability, plane_pressures, slab_permeability
-from fdnet.network.flow.solver import (
-    DIRECT,
-    MULTIGRID,
-    Balances,
-    balance_links,
-    winding_groups,
-)
+from fdnet.network.flow.solver import DIRECT, MULTIGRID, Balances, balance_links, winding_groups
 from fdnet.network.laws.named import LAWS, effective_law
 from fdnet.network.network import build_network
 from tests.network.exact import exact_balance, random_links

@@ -18,13 +18,7 @@ from fdnet.errors import CaseError
 from fdnet.scales.clock import STARTING, deposit_pressure, slab_of
 from fdnet.scales.contacts import series
 from fdnet.scales.flow import Losses, carman_kozeny, radial, straight, velocity_of
-from fdnet.scales.scales import (
-    InvasionScales,
-    back_flow,
-    invasion_scales,
-    scales_of,
-    stiffened,
-)
+from fdnet.scales.scales import InvasionScales, back_flow, invasion_scales, scales_of, stiffened
 from fdnet.scales.table import scale_rows
 from fdnet.spheres.snapshot import Array, Kind
 

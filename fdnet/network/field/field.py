@@ -116,10 +116,7 @@ def _checked(points: Any) -> Array:
     return array
 
 
-# ------------------------------------------------------------------------------------------------
-# The velocity field of a pack, from its spheres.
-
-
+# ---- The velocity field of a pack, from its spheres.
 COARSEST, FINEST, AFFORDED = 10.0, 18.0, 1_000_000
 """Cells across a mean grain where none is given: as many between the first two as keep the grid
 below the third number of cells (`python scripts/validation.py velocity-field`)."""

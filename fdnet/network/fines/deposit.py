@@ -251,10 +251,7 @@ def _shadow(
     return weight * turn - side * tilt, turn
 
 
-# ------------------------------------------------------------------------------------------------
-# The parts of tetrahedra inside the box: cut at its mirrored faces into smaller tetrahedra.
-
-
+# ---- The parts of tetrahedra inside the box: cut at its mirrored faces into smaller tetrahedra.
 FLAT = 1e-14
 """Volume over the cube of the longest edge, below which a tetrahedron is flat."""
 ENDS = {
@@ -310,10 +307,7 @@ def _meeting(corner: Array, height: Array, i: int, j: int) -> Array:
     return corner[:, i] + share[:, None] * (corner[:, j] - corner[:, i])
 
 
-# ------------------------------------------------------------------------------------------------
-# Which fines reach into the box; their images, shifted or mirrored, beyond its faces.
-
-
+# ---- Which fines reach into the box; their images, shifted or mirrored, beyond its faces.
 def centred_inside(network: Network, position: Array) -> Array:
     """True (N,) for `position` (N, 3) m within the box along the axes that are not periodic."""
     low, high = network.box.T
@@ -364,10 +358,7 @@ def size_classes(radius: Array) -> list[Array]:
     return [np.flatnonzero(step == one) for one in np.unique(step)]
 
 
-# ------------------------------------------------------------------------------------------------
-# What the fines fill of each pore, exact for every fine.
-
-
+# ---- What the fines fill of each pore, exact for every fine.
 class Holders(NamedTuple):
     """The pores (P) of a `network`, which hold fines, as tetrahedra inside the box."""
 

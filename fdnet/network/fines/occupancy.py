@@ -163,10 +163,7 @@ OVERLAPS = {"exact": exact_volume, "two-plane": two_plane_volume}
 """Estimates of the common volume by their names in a case."""
 
 
-# ------------------------------------------------------------------------------------------------
-# What fines take up of each throat and pore. They never change the network itself.
-
-
+# ---- What fines take up of each throat and pore. They never change the network itself.
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Occupancy:
     """Fines in throats (T) and pores (P), and pairs (K) of a throat and a fine in it; SI units.

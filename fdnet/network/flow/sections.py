@@ -118,10 +118,7 @@ def _pieces(network: Network, flow: Flow, halves: Array | None) -> tuple[Array, 
     return np.concatenate(ends), np.concatenate(falls), np.concatenate([flux, flux])
 
 
-# ------------------------------------------------------------------------------------------------
-# Thin layers of the first millimetre of a specimen.
-
-
+# ---- Thin layers of the first millimetre of a specimen.
 FIRST = 1e-3
 """Depth that is divided into layers, m: the first millimetre."""
 MOST_LAYERS = 200
@@ -159,10 +156,7 @@ def layer_edges(box: Array, thickness: float) -> Array:
     return np.append(low + thick * np.arange(count), low + depth)
 
 
-# ------------------------------------------------------------------------------------------------
-# Permeability, porosity and fines by depth: sections with their own k, and a finer profile.
-
-
+# ---- Permeability, porosity and fines by depth: sections with their own k, and a finer profile.
 FACE_TOLERANCE = 1e-6
 """Given edges may miss the faces of the box by this share of its length."""
 DIAMETER_TOLERANCE = 1e-9

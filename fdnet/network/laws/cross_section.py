@@ -183,10 +183,7 @@ def _set_wall(shapes: Shapes, throats: Array, number: int, place: Array, outward
     shapes.body[throats, number, 3] = radius
 
 
-# ------------------------------------------------------------------------------------------------
-# The flow through one polygon between any number of discs, summed over rays.
-
-
+# ---- The flow through one polygon between any number of discs, summed over rays.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
 HALF = len(POINTS)
 RAYS = 2 * HALF

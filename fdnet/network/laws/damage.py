@@ -25,17 +25,11 @@ CLEAN, DEPOSITION, CLOGGING, BLOCKED, SECTIONS = (
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Damage:
-    """Conductance of throats (T) with fines.
+    """Conductance of throats (T) with fines."""
 
-    Attributes:
-        conductance: (T,) m3, at most that of the clean throat.
-        law_used: (T,) which rule applied: clean, deposition, clogging, blocked or sections.
-        counts: how many throats, pores or sides were capped or closed.
-    """
-
-    conductance: Array
-    law_used: Array
-    counts: Mapping[str, int]
+    conductance: Array  # (T,) m3, at most that of the clean throat
+    law_used: Array  # (T,) which rule applied: clean, deposition, clogging, blocked or sections
+    counts: Mapping[str, int]  # how many throats, pores or sides were capped or closed
 
     __repr__ = one_line
 
@@ -49,10 +43,7 @@ class DamageLaw(Protocol):
     def __call__(self, network: Network, occupancy: Occupancy, clean: Array) -> Damage: ...
 
 
-# ------------------------------------------------------------------------------------------------
-# The damage law of the thesis: fines line, clog or block the cylinder of a throat (Shi 2011).
-
-
+# ---- The damage law of the thesis: fines line, clog or block the cylinder of a throat (Shi 2011).
 TORTUOSITY = 2.5
 TEXT_THRESHOLD, CODE_THRESHOLD = 0.40, 0.36
 """Throat porosity below which fines clog: in the text of the thesis, and in its appendix B."""

@@ -44,10 +44,7 @@ def lubrication_law(network: Network) -> Array:
     return 1.0 / grain_resistances(network).sum(axis=1)
 
 
-# ------------------------------------------------------------------------------------------------
-# The laws by the names that a case or the command line gives them.
-
-
+# ---- The laws by the names that a case or the command line gives them.
 LAWS: Mapping[str, Law] = {
     "thesis": thesis_law,
     "effective": effective_law,

@@ -86,11 +86,7 @@ def with_open_sections(network: Network, part: slice, heights: Array) -> Array:
 
 
 def spheres_around(
-    network: Network,
-    part: slice,
-    rows: Array,
-    heights: Array,
-    trees: list[tuple[Array, cKDTree]],
+    network: Network, part: slice, rows: Array, heights: Array, trees: list[tuple[Array, cKDTree]]
 ) -> SpheresBeside:
     """The spheres around `rows` (R,) of the throats `part` (K).
 

@@ -70,10 +70,7 @@ def section_archie_damage(network: Network, occupancy: Occupancy, clean: Array) 
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# Which fines reach into the sections of a throat, and where they lie as seen from its facet.
-
-
+# ---- Which fines reach into the sections of a throat, and where they lie as seen from its facet.
 class ThroatPart(NamedTuple):
     """What does not depend on the fines, of throats (K) that are computed together.
 
@@ -185,10 +182,7 @@ def _set_reaching(
                 real[n] = real[n] and inwards(base, side, i, x, y) > -r
 
 
-# ------------------------------------------------------------------------------------------------
-# The resistances without and with fines.
-
-
+# ---- The resistances without and with fines.
 def fine_resistances(
     network: Network,
     fines: Snapshot,
@@ -254,25 +248,15 @@ def _steps(beside: SpheresBeside, heights: Array, step: float) -> tuple[Array, A
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class KeptSections:
-    """Resistances of the sides of throats (T) among fines.
+    """Resistances of the sides of throats (T) among fines."""
 
-    Attributes:
-        network: pores and throats.
-        parts: what does not depend on the fines, of its throats.
-        step: greatest between two sections, in radii of the smallest fine in the throat.
-        fines: at the places for which the resistances hold.
-        without: (T, 2) 1/m3, without the fines; see `fine_resistances`.
-        raised: (T, 2) 1/m3, with them.
-        renewed: number of throats that the last change summed anew.
-    """
-
-    network: Network
-    parts: Sequence[ThroatPart]
-    step: float
-    fines: Snapshot
-    without: Array
-    raised: Array
-    renewed: int
+    network: Network  # pores and throats
+    parts: Sequence[ThroatPart]  # what does not depend on the fines, of its throats
+    step: float  # greatest between two sections, in radii of the smallest fine in the throat
+    fines: Snapshot  # at the places for which the resistances hold
+    without: Array  # (T, 2) 1/m3, without the fines; see `fine_resistances`
+    raised: Array  # (T, 2) 1/m3, with them
+    renewed: int  # number of throats that the last change summed anew
 
     __repr__ = one_line
 

@@ -34,30 +34,21 @@ ITERATIONS = 20
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlacedGrains:
-    """The n grains that reach into the box, every centre inside it or on its mirrored faces.
+    """The n grains that reach into the box, every centre inside it or on its mirrored faces."""
 
-    Attributes:
-        grains: the n grains, their positions and radii as they are tessellated.
-        own_radius: (n,) m, that of a grain centred beyond an x face, for which a half sphere
-            stands; of all others the radius as it is tessellated.
-        outward: (n,) m, how far beyond an x face such a grain is centred; 0 for all others.
-        index: (n,) which of the given grains they are.
-        periodic: whether the sides x, y and z are periodic; the other faces are mirror planes.
-        scale: m, mean radius of these grains as given.
-        beyond: number of grains whose given centre lay beyond a mirrored face.
-        inside: (n,) whether the centre of a grain lies inside another one, as in clumps.
-        dropped: number of grains that were left out, because they lie wholly inside another one or
-            are placed where a larger one is.
-    """
-
-    grains: Snapshot
+    grains: Snapshot  # the n grains, their positions and radii as they are tessellated
+    # (n,) m, that of a grain centred beyond an x face, for which a half sphere stands; of all
+    # others the radius as it is tessellated
     own_radius: Array
-    outward: Array
-    index: Array
+    outward: Array  # (n,) m, how far beyond an x face such a grain is centred; 0 for all others
+    index: Array  # (n,) which of the given grains they are
+    # whether the sides x, y and z are periodic; the other faces are mirror planes
     periodic: tuple[bool, bool, bool]
-    scale: float
-    beyond: int
-    inside: Array
+    scale: float  # m, mean radius of these grains as given
+    beyond: int  # number of grains whose given centre lay beyond a mirrored face
+    inside: Array  # (n,) whether the centre of a grain lies inside another one, as in clumps
+    # number of grains that were left out, because they lie wholly inside another one or are placed
+    # where a larger one is
     dropped: int
 
     __repr__ = one_line

@@ -84,10 +84,7 @@ def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, ..
     )
 
 
-# ------------------------------------------------------------------------------------------------
-# The tessellation of placed grains: tetrahedra that fill the box, and the facets they share.
-
-
+# ---- The tessellation of placed grains: tetrahedra that fill the box, and the facets they share.
 FIRST_MARGIN = 3.5
 """Images of grains are first made within this many radii of the largest grain of the box."""
 ROUNDS = 8
@@ -207,10 +204,7 @@ def copies_of_cell(
     return 1, 1, 1
 
 
-# ------------------------------------------------------------------------------------------------
-# What is measured on one facet after the other, in one compiled pass.
-
-
+# ---- What is measured on one facet after the other, in one compiled pass.
 SIDE_ENDS = (1, 2, 0)
 """The corner that follows each corner of a triangle."""
 
@@ -321,10 +315,7 @@ def heights(
     return height
 
 
-# ------------------------------------------------------------------------------------------------
-# Polyhedra: tetrahedra of one power centre, which the tessellation splits arbitrarily.
-
-
+# ---- Polyhedra: tetrahedra of one power centre, which the tessellation splits arbitrarily.
 ADOPTION_ROUNDS = 8
 
 

@@ -97,10 +97,7 @@ def _members(
     return order, first, turns
 
 
-# ------------------------------------------------------------------------------------------------
-# Throats: the open sections of the facets that two pores share.
-
-
+# ---- Throats: the open sections of the facets that two pores share.
 LENGTH_FLOOR = 1e-3
 """Shortest length of a throat, in mean grain radii."""
 TOUCHING = 1e-6
