@@ -405,10 +405,7 @@ def test_liggghts_shows_the_velocity_that_each_fine_was_given(go, fluid, tmp_pat
     assert watched.compared > 1000
 
 
-# ------------------------------------------------------------------------------------------------
-# What LIGGGHTS shows and takes in.
-
-
+# ---- What LIGGGHTS shows and takes in.
 def small(*more):
     """15 grains and fines in batches."""
     keys = ("fluid.darcy_length_mm=20.0", "fines.supply=batches", "fines.count=400")
@@ -517,10 +514,7 @@ def applied_force(case, fines, folder) -> np.ndarray:
     return second.column("fx") - first.column("fx")
 
 
-# ------------------------------------------------------------------------------------------------
-# What fines meet on the way until the next update.
-
-
+# ---- What fines meet on the way until the next update.
 TRACER, FINE = 1e9, "fines.radius_mm=0.0125"
 
 

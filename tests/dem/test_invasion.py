@@ -146,10 +146,7 @@ def test_fines_that_vanish_are_an_error(grains_of, tmp_path):
             check_counts(tmp_path, row, damaged, supplied)
 
 
-# ------------------------------------------------------------------------------------------------
-# The overlap of fines: it is measured right, changes no motion, warns or stops.
-
-
+# ---- The overlap of fines: it is measured right, changes no motion, warns or stops.
 def test_what_was_seen_is_read_line_by_line(tmp_path):
     assert list(read_watch(tmp_path)) == []
     (tmp_path / "overlap.csv").write_text(

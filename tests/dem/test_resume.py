@@ -230,10 +230,7 @@ def test_what_another_version_of_fdnet_began_is_refused(go, cut):
         go(CASE, folder)
 
 
-# ------------------------------------------------------------------------------------------------
-# Invasions whose forces fdnet computes while LIGGGHTS waits.
-
-
+# ---- Invasions whose forces fdnet computes while LIGGGHTS waits.
 def small(*more):
     """15 grains, fines in batches, 5 checkpoints with five updates each."""
     return followed(
