@@ -1,14 +1,18 @@
 """Small cases, built in code."""
 
+import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, set_keys
+from fdnet.cli import main
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 
 TINY: dict[str, Any] = {
@@ -59,6 +63,28 @@ def followed(*more, way="fluid.velocity_m_s=5.0"):
         "run.checkpoint_ms=0.1",
         *more,
     )
+
+
+def answer(capsys: Any, *arguments: object) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of one command."""
+    try:
+        code = main([str(argument) for argument in arguments])
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    return code, *capsys.readouterr()
+
+
+@contextmanager
+def disk_of(size: str, place: Path) -> Iterator[Path]:
+    """A small file system at `place`; `size` such as "8k"."""
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("mounting a small file system needs root")
+    try:
+        yield place
+    finally:
+        subprocess.run(["umount", str(place)], check=True)
 
 
 @contextmanager

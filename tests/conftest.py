@@ -61,6 +61,16 @@ def grains_of(
     return grains
 
 
+@pytest.fixture
+def case_file(tmp_path: Path) -> Path:
+    """The file of the tiny case."""
+    from builders import tiny
+
+    path = tmp_path / "case.toml"
+    path.write_text(tiny("run.cap_ms=0.35").toml())
+    return path
+
+
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> FinishedRun:
     """A tiny run of all stages: fixed grains, periodic sides. Tests leave its folder as it is."""

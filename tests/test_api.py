@@ -13,6 +13,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from builders import tiny
 
@@ -26,6 +27,7 @@ ERRORS = {name for name in fdnet.__all__ if name.endswith("Error")}
 UNITS = re.compile(r"(?<![A-Za-z])(m|mm|um|m2|m3|mD|Pa s|SI|s)(?![A-Za-z0-9])")
 NEED_A_RUN = ("run_case", "open_run", "elastic_moduli", "triaxial_test")
 """The example of run_case makes the run that the others open."""
+COLUMNS = ("x", "y", "z", "radius", "kind")
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 PUBLIC = [name for name in fdnet.__all__ if name != "__version__"]
 PACKAGE = Path(str(fdnet.__file__)).parent
@@ -34,11 +36,7 @@ PACKAGE = Path(str(fdnet.__file__)).parent
 def imports_for_types() -> dict[str, str]:
     """Public names and their modules, as a type checker sees them."""
     tree = ast.parse(Path(str(fdnet.__file__)).read_text())
-    block = next(
-        node
-        for node in tree.body
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
-    )
+    block = next(node for node in tree.body if isinstance(node, ast.If))
     imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
     return {alias.asname: node.module for node in imports for alias in node.names}
 
@@ -82,14 +80,18 @@ def test_the_fixed_names_are_there_and_what_a_type_checker_sees_is_loaded():
         assert set(AnalysisKeys.__annotations__) <= set(inspect.signature(function).parameters)
 
 
-def test_importing_fdnet_loads_nothing_heavy():
-    code = (
-        "import sys, fdnet; dir(fdnet); "
-        f"print([name for name in {HEAVY} if name in sys.modules], "
-        "len([name for name in sys.modules if name.startswith('fdnet')]))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["[]", "1"]
+def test_importing_fdnet_and_its_help_load_nothing_heavy():
+    """Heavy libraries are imported only by the commands that need them."""
+    heavy = f"[name for name in {HEAVY} if name in sys.modules]"
+    own = "len([name for name in sys.modules if name.startswith('fdnet')])"
+    at_exit = f"import atexit; atexit.register(lambda: print({heavy}))"
+    for code, said in (
+        (f"import sys, fdnet; dir(fdnet); print({heavy}, {own})", "[] 1\n"),
+        (f"import sys, fdnet.cli; {at_exit}; fdnet.cli.main(['run', '--help'])", "[]\n"),
+    ):
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert done.stdout.endswith(said)
 
 
 def test_build_network_and_analyse_give_one_permeability_between_walls():
@@ -101,10 +103,10 @@ def test_build_network_and_analyse_give_one_permeability_between_walls():
 
 
 def test_wrong_arguments_of_analyse_are_named():
-    for spheres, periodic, expected in [
+    for spheres, periodic, expected in (
         ("x.csv", "", "spheres: 'x.csv' is a str, expected a Snapshot or (points, radii, box); "),
         (lattice(), 1, "periodic: 1, expected letters such as 'yz', or truth values: one, or thr"),
-    ]:
+    ):
         with pytest.raises(fdnet.CaseError, match=re.escape(expected)):
             fdnet.analyse(spheres, periodic=periodic)
 
@@ -129,15 +131,11 @@ def test_permeability_of_arrays_is_that_of_the_command(tmp_path, capsys, units, 
         scale = 1.0 if units == "mm" else 1e-3
         points, radii, box = points * scale, radii * scale, [scale * side for side in box]
         file = tmp_path / "pack.csv"
-        rows = [
-            ",".join([*map(repr, map(float, (*p, r))), k])
-            for p, r, k in zip(points, radii, kinds, strict=True)
-        ]
-        file.write_text("\n".join(["x,y,z,radius,kind", *rows]))
+        columns = [*points.T, radii, kinds]
+        pd.DataFrame(dict(zip(COLUMNS, columns, strict=True))).to_csv(file, index=False)
         given = ["--units", units, "--box", ",".join(f"0,{side!r}" for side in box)]
-        assert main(
-            ["permeability", str(file), *given, "--periodic", periodic, "--axis", "all", "--json"]
-        ) == 0  # fmt: skip
+        given += ["--periodic", periodic, "--axis", "all", "--json"]
+        assert main(["permeability", str(file), *given]) == 0
         said = json.loads(capsys.readouterr().out)
         own = {"units": units, "kind": kinds, "periodic": periodic}
         result = fdnet.permeability(points, radii, box, axis="all", **own)

@@ -1,14 +1,14 @@
 """`fdnet check`: what is odd about a case is said with what follows and what to do."""
 
-import csv
 import json
 import math
 import re
 import subprocess
 import sys
 
+import pandas as pd
 import pytest
-from builders import naming, tiny
+from builders import answer, naming, tiny
 
 import fdnet
 from fdnet.case.file import case_from
@@ -25,11 +25,7 @@ def keys(*assignments: str) -> set[str]:
 
 
 WELL = ("well.radius_mm=108", "well.drainage_radius_m=100")
-
-
 BULKY = ("box.size_mm=[3.0,3.0,3.0]", "grains.count=248", "box.sides=periodic")
-
-
 SOUND = (*WELL, *BULKY, "fines.count=3000")
 
 
@@ -41,9 +37,8 @@ def test_what_is_odd_is_named_and_nothing_else():
         (("run.cap_ms=2.0",), "run.cap_ms"),
         (("fines.radius_mm=0.12", "fines.count=400"), "fines.radius_mm"),
     ]:
-        with naming(odd, key):
-            assert key not in keys(*SOUND)
-            assert key in keys(*SOUND, *odd)
+        assert key not in keys(*SOUND)
+        assert key in keys(*SOUND, *odd)
 
 
 def test_a_velocity_of_no_well_and_a_finest_tenth_that_takes_the_time_are_named():
@@ -61,28 +56,16 @@ def test_a_velocity_of_no_well_and_a_finest_tenth_that_takes_the_time_are_named(
 
 def test_the_errors_by_width_are_those_of_the_study(root):
     """The means of `specimen-size.csv` over the seeds of each cube."""
-
-    path = root / "docs/evidence/error_against_time/specimen-size.csv"
-    rows = [
-        row
-        for row in csv.DictReader(path.open(encoding="utf-8"))
-        if row["quantity"] == "k_initial" and row["series"].startswith("intact")
-    ]
-    by_width: dict[tuple[str, float], list[float]] = {}
-    for row in rows:
-        edge = (float(row["value"]) * 4 / 3 * math.pi * 0.25**3 / 0.6) ** (1 / 3)
-        width = round(4 * edge) / 4 / 0.5  # the cubes have edges in whole quarters of 1 mm
-        by_width.setdefault((row["series"], width), []).append(float(row["observed"]))
-    bulk = by_width["intact, periodic sides", 16.0]
-    for series, errors in (
-        ("intact, periodic sides", PERIODIC),
-        ("intact, walls at the sides", WALLS),
-    ):
+    table = pd.read_csv(root / "docs/evidence/error_against_time/specimen-size.csv")
+    table = table[(table.quantity == "k_initial") & table.series.str.startswith("intact")]
+    # the cubes have edges in whole quarters of 1 mm
+    edge = (table.value.astype(float) * 4 / 3 * math.pi * 0.25**3 / 0.6) ** (1 / 3)
+    means = table.groupby(["series", (4 * edge).round() / 4 / 0.5])["observed"].mean()
+    bulk = means["intact, periodic sides", 16.0]
+    for sides, errors in (("periodic sides", PERIODIC), ("walls at the sides", WALLS)):
         for width, error in zip(WIDTHS, errors, strict=False):
-            got = by_width[series, width]
-            assert sum(got) / len(got) / (sum(bulk) / len(bulk)) - 1 == pytest.approx(
-                error, abs=0.002
-            )
+            found = means[f"intact, {sides}", width] / bulk - 1
+            assert found == pytest.approx(error, abs=0.002), (sides, width)
     assert width_error(4.8, periodic=False) == pytest.approx(-0.226, abs=0.041)
     assert width_error(5.5, periodic=True) == pytest.approx(-0.0595, abs=0.002)
     assert -0.01 < width_error(100, periodic=True) < 0
@@ -100,38 +83,30 @@ def test_the_command_prints_findings_with_what_to_do(tmp_path, capsys):
     data = json.loads(capsys.readouterr().out)
     assert data["findings"][0]["refused"]
     assert all(one["follows"] for one in data["findings"])
-    assert data["seconds"] == pytest.approx(
-        data["seconds_pack"] + data["seconds_invade"] + data["seconds_analyse"]
-    )
+    parts = sum(data[f"seconds_{stage}"] for stage in ("pack", "invade", "analyse"))
+    assert data["seconds"] == pytest.approx(parts)
     assert main(["render", str(path), "--out", str(tmp_path / "decks")]) == 0
     assert text.strip() in capsys.readouterr().out
 
 
 def test_check_refuses_what_run_refuses(tmp_path, capsys):
     """Both have one list, so they say the same, too."""
-    for number, (assignments, refused) in enumerate(
-        [
-            ((), ""),
-            (("grains.count=3", "run.stiffness_N_m=auto"), "3 grains, expected at least 4"),
-            (("clean_up={drawdown_MPa=1000.0}",), "clean_up.drawdown_MPa: 1000"),
-            (("fines={radius_mm=0.2, count=200, concentration=0.3}",), "fines without a place"),
-            (("grains={radius_mm=0.25, porosity=0.2, max_overlap=0.02}",), "0.2 is out of reach"),
-            (("run.max_hours=1e-6",), "run.max_hours"),
-            (("fluid.velocity_m_s=5e9",), "drag alone would press"),
-        ]
+    path, out = tmp_path / "case.toml", tmp_path / "run"
+    path.write_text(tiny().toml())
+    assert answer(capsys, "check", path)[0] == 0
+    for assignments, refused in (
+        (("grains.count=3", "run.stiffness_N_m=auto"), "3 grains, expected at least 4"),
+        (("clean_up={drawdown_MPa=1000.0}",), "clean_up.drawdown_MPa: 1000"),
+        (("fines={radius_mm=0.2, count=200, concentration=0.3}",), "fines without a place"),
+        (("grains={radius_mm=0.25, porosity=0.2, max_overlap=0.02}",), "0.2 is out of reach"),
+        (("run.max_hours=1e-6",), "run.max_hours"),
+        (("fluid.velocity_m_s=5e9",), "drag alone would press"),
     ):
-        folder_ = tmp_path / str(number)
-        folder_.mkdir()
-        with naming(assignments, refused):
-            path, out = folder_ / "case.toml", folder_ / "run"
-            path.write_text(tiny(*assignments).toml())
-            assert main(["check", str(path)]) == (2 if refused else 0)
-            said = " ".join("".join(capsys.readouterr()).split())
-            assert refused in said
-            if refused:
-                assert main(["run", str(path), "--out", str(out)]) == 2
-                assert refused in capsys.readouterr().err
-                assert not out.exists()
+        path.write_text(tiny(*assignments).toml())
+        code, *said = answer(capsys, "check", path)
+        assert (code, refused in " ".join("".join(said).split())) == (2, True), said
+        code, _, error = answer(capsys, "run", path, "--out", out)
+        assert (code, refused in error, out.exists()) == (2, True, False), error
 
 
 def test_a_specimen_that_the_damage_can_cross_is_named(root):
@@ -173,15 +148,12 @@ sys.exit(fdnet.cli.main())
 
 def test_a_stop_inside_a_compiler_is_one_line():
     """llvmlite's call-back loses a KeyboardInterrupt, and numba raises another error for it."""
-    for raises in [True, False]:
-        with naming(raises):
-            command = [sys.executable, "-c", STOPPED.format(raises=raises)]
-            ended = subprocess.run(
-                command, capture_output=True, text=True, timeout=15, check=False
-            )
-            assert ended.returncode == 130
-            (line,) = ended.stderr.splitlines()
-            assert "repeat the command to go on (a run: with --resume)" in line
+    for raises in (True, False):
+        command = [sys.executable, "-c", STOPPED.format(raises=raises)]
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=15, check=False)
+        assert ended.returncode == 130, raises
+        (line,) = ended.stderr.splitlines()
+        assert "repeat the command to go on (a run: with --resume)" in line
 
 
 def test_laws_of_the_thesis_are_said_to_be_wrong_with_the_default_beside(finished, capsys):

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -10,11 +11,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from builders import tiny
+from builders import answer, tiny
 
-from fdnet.cli import main
+from fdnet.dem.deck import snapshot_of
+from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError, DumpError, LiggghtsError, NetworkError
 from fdnet.network.permeability import analyse
+from fdnet.network.specimen import doubts, empty_duct_permeability
+from fdnet.spheres.dump import COLUMNS, Frame
 from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.packs import snapshot
 
@@ -22,23 +26,6 @@ BOX = ("--box", "0,3,0,3,0,3")
 CUBE = np.indices((3, 3, 3)).reshape(3, -1).T + 0.5
 """Centres of touching grains of radius 0.5 that fill the box."""
 BOUNDS = np.array([[0.0, 3.0]] * 3)
-
-
-@pytest.fixture
-def case(tmp_path: Path) -> Path:
-    """The file of the tiny case."""
-    path = tmp_path / "case.toml"
-    path.write_text(tiny("run.cap_ms=0.35").toml())
-    return path
-
-
-def answer(capsys, *arguments: object) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error of one command."""
-    try:
-        code = main([str(argument) for argument in arguments])
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    return code, *capsys.readouterr()
 
 
 def refusal(capsys, *arguments: object, code: int = 2) -> str:
@@ -66,26 +53,28 @@ def frame(step: str, row: str) -> str:
     return head + "0 1\n" * 3 + f"ITEM: ATOMS id type x y z radius\n{row}\n"
 
 
-def test_the_depth_and_length_of_a_case_have_bounds(tmp_path, case, capsys):
+def test_the_depth_and_length_of_a_case_have_bounds(tmp_path, case_file, capsys):
     deep = tmp_path / "deep.toml"
     deep.write_text("seed = " + "[" * 20000 + "]" * 20000 + "\n")
     long, longest = "9" * 400, "9" * 5000
     out = ("--out", tmp_path / "decks")
     assert "nested too deeply" in refusal(capsys, "render", deep, *out)
-    assert "parts" in refusal(capsys, "render", case, *out, "--set", "a." * 5000 + "a=1")
+    assert "a dotted key" in refusal(
+        capsys, "render", case_file, *out, "--set", "a." * 5000 + "a=1"
+    )
     for number in (long, longest):
         for key in ("seed", "grains.count", "fines.radius_mm", "box.size_mm"):
-            refusal(capsys, "render", case, *out, "--set", f"{key}={number}")
+            refusal(capsys, "render", case_file, *out, "--set", f"{key}={number}")
         deep.write_text(f"seed = {number}\n")
         refusal(capsys, "render", deep, *out)
-        refusal(capsys, "render", case, *out, "--np", number)
-        refusal(capsys, "render", case, *out, "--seed", number)
+        refusal(capsys, "render", case_file, *out, "--np", number)
+        refusal(capsys, "render", case_file, *out, "--seed", number)
     assert not (tmp_path / "decks").exists()
 
 
-def test_a_second_line_of_an_assignment_is_not_dropped(tmp_path, case, capsys):
+def test_a_second_line_of_an_assignment_is_not_dropped(tmp_path, case_file, capsys):
     for text in ("seed=1\ngrains.count=50", "name=a\nb", "seed=1\n[fines]\ncount=1"):
-        err = refusal(capsys, "render", case, "--out", tmp_path / "decks", "--set", text)
+        err = refusal(capsys, "render", case_file, "--out", tmp_path / "decks", "--set", text)
         assert "is not one value" in err
 
 
@@ -139,9 +128,6 @@ def test_a_snapshot_holds_no_number_that_is_none():
 
 
 def test_a_dump_of_a_run_with_a_sphere_of_no_kind_or_size_is_named():
-    from fdnet.dem.deck import snapshot_of
-    from fdnet.spheres.dump import COLUMNS, Frame
-
     columns = tuple(COLUMNS.split())
     for column, value in (("type", 3.0), ("radius", 0.0)):
         rows = np.array([[7, 1, 1e-4, 1e-4, 1e-4, 0, 0, 0, 2e-4]])
@@ -151,8 +137,10 @@ def test_a_dump_of_a_run_with_a_sphere_of_no_kind_or_size_is_named():
             snapshot_of(frame, tiny(), time_s=0.0)
 
 
-def test_limits_of_time_ranks_and_grains_are_refused_before_anything_runs(tmp_path, case, capsys):
-    run = ["run", case, "--out", tmp_path / "run", "--set", "fluid.velocity_m_s=0.1"]
+def test_limits_of_time_ranks_and_grains_are_refused_before_anything_runs(
+    tmp_path, case_file, capsys
+):
+    run = ["run", case_file, "--out", tmp_path / "run", "--set", "fluid.velocity_m_s=0.1"]
     for option, word in (
         *((f"--timeout={value}", "timeout") for value in ("nan", "inf", "0", "-1")),
         *((f"--set=grains.count={count}", "expected at least 4") for count in (1, 2, 3)),
@@ -163,10 +151,6 @@ def test_limits_of_time_ranks_and_grains_are_refused_before_anything_runs(tmp_pa
 
 
 def test_surroundings_are_named_and_not_blamed_on_liggghts(tmp_path, monkeypatch):
-    import resource
-
-    from fdnet.dem.liggghts import find_binary
-
     monkeypatch.setenv("TMPDIR", str(tmp_path / "none"))
     with pytest.raises(LiggghtsError, match=r"TMPDIR: .*none is no folder"):
         find_binary()
@@ -176,27 +160,23 @@ def test_surroundings_are_named_and_not_blamed_on_liggghts(tmp_path, monkeypatch
         find_binary()
 
 
-def command(*arguments: object, **environment: str) -> subprocess.CompletedProcess[bytes]:
-    return subprocess.run(
-        [sys.executable, "-m", "fdnet.cli", *map(os.fsencode, map(str, arguments))],
-        capture_output=True,
-        check=False,
-        env=os.environ | environment,
-    )
+def in_ascii(*arguments: object) -> subprocess.CompletedProcess[bytes]:
+    words = [sys.executable, "-m", "fdnet.cli", *map(os.fsencode, map(str, arguments))]
+    knows = {"LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONCOERCECLOCALE": "0"}
+    return subprocess.run(words, capture_output=True, check=False, env=os.environ | knows)
 
 
-def test_a_terminal_that_knows_ascii_alone_and_names_that_are_no_utf_8(tmp_path, case):
-    surroundings = {"LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONCOERCECLOCALE": "0"}
+def test_a_terminal_that_knows_ascii_alone_and_names_that_are_no_utf_8(tmp_path, case_file):
     strange = tmp_path / os.fsdecode(b"gr\xe4in")
     for out in (tmp_path / "körner", strange):
-        refused = command("run", case, "--out", out, "--set", "nöpe=1", **surroundings)
+        refused = in_ascii("run", case_file, "--out", out, "--set", "nöpe=1")
         assert refused.returncode == 2
         assert refused.stderr.count(b"\n") == 1
-    refused = command("run", case, "--out", strange, **surroundings)
+    refused = in_ascii("run", case_file, "--out", strange)
     assert refused.returncode == 2
     assert b"is not UTF-8" in refused.stderr
     assert not strange.exists()
-    done = command("render", case, "--out", tmp_path / "körner", **surroundings)
+    done = in_ascii("render", case_file, "--out", tmp_path / "körner")
     assert done.returncode == 0, done.stderr
     assert b"k\\xf6rner/pack/in.pack" in done.stdout
 
@@ -225,8 +205,6 @@ def test_fines_beyond_the_side_walls_are_counted():
 
 
 def test_a_permeability_above_that_of_the_empty_duct_is_said_with_its_number():
-    from fdnet.network.specimen import doubts, empty_duct_permeability
-
     box = np.array([[0, 1.0], [0, 2.0], [0, 2.0]])
     square = empty_duct_permeability(box, (False, False, False))
     assert square == pytest.approx(0.035144 * 4, rel=1e-4)

@@ -25,7 +25,6 @@ assert liggghts_templates.__file__.startswith(sys.argv[3])
 print(fdnet.__file__, fast, run.sections.shape[0], again.k_damaged / run.summary["k_damaged_m2"])
 """
 
-
 COMES_WITH = {"PIL": "matplotlib", "pydantic_core": "pydantic", "vtkmodules": "pyvista"}
 """Modules that are imported, and the dependency whose own requirements bring them."""
 
@@ -45,9 +44,8 @@ def test_what_fdnet_imports_is_what_pyproject_asks_for(root):
 
     extras = project["optional-dependencies"]
     optional = asked(extras["view"] + extras["movie"] + extras["openpnm"]) - {"fdnet"}
-    assert {COMES_WITH.get(name, name) for name in imported} == optional | asked(
-        project["dependencies"]
-    )
+    needed = optional | asked(project["dependencies"])
+    assert {COMES_WITH.get(name, name) for name in imported} == needed
 
 
 def test_the_image_has_the_debian_packages_of_the_setup(root):
@@ -71,30 +69,13 @@ def installed(root, tmp_path_factory) -> Path:
     return target
 
 
-def away(target: Path) -> dict[str, str]:
-    """An environment in which Python finds fdnet in `target` first."""
-    return os.environ | {"PYTHONPATH": str(target)}
-
-
 @pytest.mark.liggghts
 def test_a_wheel_installed_elsewhere_runs_a_case(installed, binary, tmp_path):
     """The whole story and the analysis of its spheres; nothing is of the project."""
     (tmp_path / "tiny.toml").write_text(tiny("run.cap_ms=0.2").toml())
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            SMOKE,
-            str(tmp_path / "tiny.toml"),
-            str(binary.path),
-            str(installed),
-        ],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=tmp_path,
-        env=away(installed),
-    )
+    words = [sys.executable, "-c", SMOKE, "tiny.toml", str(binary.path), str(installed)]
+    there = {"cwd": tmp_path, "env": os.environ | {"PYTHONPATH": str(installed)}}
+    done = subprocess.run(words, capture_output=True, text=True, check=False, **there)
     assert done.returncode == 0, done.stderr
     file, fast, rows, ratio = done.stdout.split()
     assert file.startswith(str(installed))
@@ -110,13 +91,9 @@ def test_setup_empties_no_folder_that_its_venv_links_to(root, tmp_path, binary):
     (other / "kept.txt").write_text("kept")
     (tmp_path / "project/.venv").symlink_to(other)
     shutil.copy(root / "scripts/setup.sh", tmp_path / "project/scripts")
-    done = subprocess.run(
-        ["bash", str(tmp_path / "project/scripts/setup.sh")],
-        env=os.environ | {"FDNET_LIGGGHTS": str(binary.path)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    words = ["bash", str(tmp_path / "project/scripts/setup.sh")]
+    own = os.environ | {"FDNET_LIGGGHTS": str(binary.path)}
+    done = subprocess.run(words, env=own, capture_output=True, text=True, check=False)
     assert done.returncode != 0
     assert "is a link to" in done.stderr + done.stdout
     assert (other / "kept.txt").read_text() == "kept"

@@ -1,12 +1,13 @@
 """`fdnet permeability` on files made here."""
 
 import json
+from functools import partial
 from pathlib import Path
 
+import builders
 import numpy as np
 import pytest
 
-from fdnet.cli import main
 from fdnet.network.permeability import analyse
 from fdnet.network.stokes import extrapolate, solve_stokes
 from fdnet.report.vtk import write_spheres_vtp
@@ -45,16 +46,7 @@ def damaged(path: Path) -> Path:
 @pytest.fixture
 def answer(capsys):
     """Exit code, output and errors of the command."""
-
-    def said(*arguments: object) -> tuple[int, str, str]:
-        try:
-            code = main(["permeability", *map(str, arguments)])
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        text = capsys.readouterr()
-        return code, text.out, text.err
-
-    return said
+    return partial(builders.answer, capsys, "permeability")
 
 
 @pytest.fixture
@@ -68,10 +60,6 @@ def numbers(answer):
         return json.loads(out)
 
     return read
-
-
-def close(k: float, rel: float = 2e-3):
-    return pytest.approx(k, rel=rel, abs=0)
 
 
 def test_bad_options_end_with_2_and_one_line(tmp_path, answer):
@@ -167,13 +155,13 @@ def test_a_unit_cell_is_repeated_until_it_can_be_tessellated(
     given = ["--box", f"0,1,0,1,0,{height}", "--periodic", "xyz"]
     result = numbers(file, *given, "--axis", "all", "--sections", 2)
     for axis in "xyz":
-        assert result[f"k_{axis}_m2"] == close(k, rel=error)
+        assert result[f"k_{axis}_m2"] == pytest.approx(k, rel=error)
     times = " x 1 times" if height == 4 else " times"
     assert any("The cell was repeated" in one and times in one for one in result["assumptions"])
     rows = result["sections"]
     assert [row["x_hi_m"] for row in rows] == pytest.approx([5e-4, 1e-3])
     series = sum(5e-4 / row["k_initial_inplace_m2"] for row in rows)
-    assert 1e-3 / series == close(result["k_x_m2"], rel=1e-4)
+    assert 1e-3 / series == pytest.approx(result["k_x_m2"], rel=1e-4)
 
 
 def test_a_sphere_inside_a_grain_adds_nothing(tmp_path, numbers):
@@ -190,7 +178,7 @@ def test_a_sphere_inside_a_grain_adds_nothing(tmp_path, numbers):
         for kind in ("grain", "fine") if name != "there twice" else ("grain",):
             kinds = ["grain"] * 27 + [kind] * len(more)
             result = numbers(table(tmp_path / "nested.csv", rows, kinds), *every)
-            assert result["k_initial_m2"] == close(CUBIC), (name, kind)
+            assert result["k_initial_m2"] == pytest.approx(CUBIC, rel=2e-3), (name, kind)
             assert result["k_damaged_m2"] == result["k_initial_m2"], (name, kind)
             assert result["spheres_dropped"] == len(more), (name, kind)
             text = f"{len(more)} {kind}s lie wholly inside"
@@ -224,10 +212,7 @@ CUBE = (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1) / 3**0.5
 
 @pytest.mark.parametrize(
     ("parts", "radii"),
-    [
-        (np.vstack([[0, 0, 0], 0.8 * CORNERS]), [1, 0.3, 0.3, 0.3, 0.3]),
-        (0.52 * CUBE, [0.72] * 8),
-    ],
+    [(np.vstack([[0, 0, 0], 0.8 * CORNERS]), [1, 0.3, 0.3, 0.3, 0.3]), (0.52 * CUBE, [0.72] * 8)],
     ids=["bumps", "eight"],
 )
 def test_clumps_are_right_against_resolved_flow(parts, radii):
@@ -249,4 +234,4 @@ def test_clumps_are_right_against_resolved_flow(parts, radii):
     coarse, fine = (solve_stokes(clumps, cells=cells, tolerance=1e-3) for cells in (32, 48))
     right, result = extrapolate(coarse, fine).k, analyse(clumps, periodic="xyz")
     assert result.counts["grains_centred_in_others"] > count
-    assert result.k_initial == close(right, rel=0.05)
+    assert result.k_initial == pytest.approx(right, rel=0.05)

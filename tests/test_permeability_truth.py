@@ -4,36 +4,36 @@ import json
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fdnet.cli import main
 from fdnet.names import ALL_SPHERES, AUTO, DEFAULT_LAW, SECTION_ARCHIE
 from fdnet.network.laws.named import DAMAGE_LAWS, LAWS
-from fdnet.spheres.snapshot import KIND_NAMES, Kind
+from fdnet.spheres.snapshot import KIND_NAMES
 from validation.truth import cases
-
-
-def command(path, case, *more):
-    """Writes the spheres of a case as a table in mm and returns the words of the command."""
-    pack = case.pack
-    kinds = {int(kind): name for name, kind in KIND_NAMES.items()}
-    rows = np.column_stack([pack.position, pack.radius]) * 1e3
-    with path.open("w") as file:
-        file.write("x,y,z,radius,kind\n")
-        for row, kind in zip(rows, pack.kind, strict=True):
-            file.write(",".join(map(repr, row.tolist())) + f",{kinds[Kind(int(kind))]}\n")
-    box = ",".join(str(edge) for edge in (1e3 * pack.box).ravel())
-    sides = () if "--periodic" in more else ("--periodic", "xyz")
-    return ["permeability", str(path), "--units", "mm", "--box", box, *sides, *more]
 
 
 @pytest.fixture
 def run(tmp_path, capsys):
+    """What the command says of the spheres of a case, written as a table in mm."""
+
     def result(case, *more):
-        assert main([*command(tmp_path / "pack.csv", case, "--json", *more)]) == 0
+        assert main(command(tmp_path / "pack.csv", case, "--json", *more)) == 0
         return json.loads(capsys.readouterr().out)
 
     return result
+
+
+def command(path, case, *more):
+    pack = case.pack
+    kinds = {int(kind): name for name, kind in KIND_NAMES.items()}
+    rows = 1e3 * np.column_stack([pack.position, pack.radius])
+    table = pd.DataFrame(rows, columns=["x", "y", "z", "radius"])
+    table.assign(kind=[kinds[int(kind)] for kind in pack.kind]).to_csv(path, index=False)
+    box = ",".join(str(edge) for edge in (1e3 * pack.box).ravel())
+    sides = () if "--periodic" in more else ("--periodic", "xyz")
+    return ["permeability", str(path), "--units", "mm", "--box", box, *sides, *more]
 
 
 @pytest.fixture(scope="module")

@@ -20,13 +20,8 @@ KEPT = study.KEPT
 def rows(*lines: tuple) -> pd.DataFrame:
     """A table of (series, value, seed, observed) of the quantity q."""
     names = ("series", "value", "seed", "observed")
-    return judge.rows_from(
-        [
-            dict(zip(names, line, strict=True))
-            | {"knob": "k", "quantity": "q", "core_s": 1.0, "status": DONE}
-            for line in lines
-        ]
-    )
+    same = {"knob": "k", "quantity": "q", "core_s": 1.0, "status": DONE}
+    return judge.rows_from([dict(zip(names, line, strict=True)) | same for line in lines])
 
 
 def by_value(table: pd.DataFrame, quantity: str = "q") -> dict[str, Level]:

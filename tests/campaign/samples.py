@@ -14,10 +14,7 @@ from fdnet.run.folder import TABLES, digests_of, mark_folder
 def compared(
     path: Path, values: Mapping[str, Sequence[object]], quantity="k_reduction", *, shared=True
 ):
-    """`fdnet.compare_runs` of variants with these values of a quantity, one of each seed from 1.
-
-    `shared` gives the runs of one seed one pack.
-    """
+    """What `values` by variant give, one of each seed from 1; `shared`: one pack a seed."""
     folders = []
     for number, (name, column) in enumerate(values.items()):
         key = "fines.count" if shared else "grains.count"
@@ -33,20 +30,15 @@ def finished_run(folder: Path, case: Case, **numbers: object) -> None:
     """A run folder as fdnet leaves it, with made-up results: `numbers` of its summary."""
     for stage in ("pack", "invade"):
         (folder / stage).mkdir(parents=True)
+        ones = ("seconds", "max_overlap", "dt_s", "porosity", "porosity_assumed")
         record = {
-            "format": 1,
-            "digest": case.digest(stage),
-            **dict.fromkeys(
-                ("seconds", "max_overlap", "dt_s", "porosity", "porosity_assumed"), 1.0
-            ),
+            **{"format": 1, "digest": case.digest(stage), "stop_reason": "plugged", "ranks": 1},
+            **dict.fromkeys(ones, 1.0),
             **dict.fromkeys(("steps", "supplied"), 1),
-            "stop_reason": "plugged",
-            "ranks": 1,
             "files": {"post/gone.dump": "0" * 64},
             "runs": [{"version": "3.8.0", "seconds": 1.0}],
             "attempts": [{"liggghts_s": 1.0}],
-            "left_out": [],
-            "warnings": [],
+            **{"left_out": [], "warnings": []},
         }
         (folder / stage / "stage.json").write_text(json.dumps(record))
     numbers = {

@@ -30,24 +30,22 @@ def test_the_band_of_a_mean_is_students(tmp_path):
     single = compared(tmp_path / "one", {"a": [0.4]})
     assert ends(single.summary["k_reduction"]) == (0.4, None, None)
     assert single.ranking == ("a: permeability lost 40.0 % (no band: one run), 1 seed.",)
+    two = compared(tmp_path / "two", {"a": [0.4], "b": [0.5]})
+    said = "a and b: difference −10.0 % (no band: one run); not distinguished."
+    assert two.differences == (said,)
 
 
-def test_a_paired_difference_is_that_of_students_sleep_data(tmp_path):
-    """t = -4.0621, p = 0.002833, 95 % from -2.4599 to -0.7001, as textbooks give it."""
-    (pair,) = compared(tmp_path, {"a": DRUG_1, "b": DRUG_2}, "skin").summary["pairs"]
-    assert (pair["paired"], pair["apart"]) == (True, True)
-    assert pair["p_value"] == pytest.approx(0.002833, rel=1e-3)
-    expected = (-1.58, -2.4598858, -0.7001142)
-    assert ends(pair["difference"]) == pytest.approx(expected, rel=1e-6)
-
-
-def test_an_unpaired_difference_is_welchs(tmp_path):
-    """The same data as two samples: p = 0.07939, 95 % from -3.3655 to 0.2055."""
-    made = compared(tmp_path, {"a": DRUG_1, "b": DRUG_2}, "skin", shared=False)
-    (pair,) = made.summary["pairs"]
-    assert (pair["paired"], pair["apart"]) == (False, False)
-    assert pair["p_value"] == pytest.approx(0.07939, rel=1e-3)
-    assert ends(pair["difference"])[1:] == pytest.approx((-3.3654832, 0.2054832), rel=1e-6)
+def test_differences_of_students_sleep_data_are_those_of_textbooks(tmp_path):
+    """Paired t = -4.0621 (Student 1908); as two samples Welch's p = 0.07939."""
+    for paired, p_value, low, high in (
+        (True, 0.002833, -2.4598858, -0.7001142),
+        (False, 0.07939, -3.3654832, 0.2054832),
+    ):
+        values = {"a": DRUG_1, "b": DRUG_2}
+        (pair,) = compared(tmp_path / f"{paired}", values, "skin", shared=paired).summary["pairs"]
+        assert (pair["paired"], pair["apart"]) == (paired, paired)
+        assert pair["p_value"] == pytest.approx(p_value, rel=1e-3)
+        assert ends(pair["difference"]) == pytest.approx((-1.58, low, high), rel=1e-6)
 
 
 def test_the_seeds_needed_are_cohens(tmp_path):
@@ -127,18 +125,15 @@ def test_a_band_ends_where_its_quantity_does(tmp_path):
         assert row.get("cut_at", []) == cut
         assert ("cut at" in made.ranking[0]) == bool(cut)
         assert row["mean"] == pytest.approx(sum(values) / len(values))
-    assert (
-        "95 % band 0.0 to 100.0 %, cut at 0.0 % and 100.0 %"
-        in compared(tmp_path / "words", {"a": [0.5, 0.6]}).ranking[0]
-    )
+    said = compared(tmp_path / "words", {"a": [0.5, 0.6]}).ranking[0]
+    assert "95 % band 0.0 to 100.0 %, cut at 0.0 % and 100.0 %" in said
 
 
 def test_one_variant_is_not_ranked(tmp_path):
     made = compared(tmp_path, {"mud": [0.3, 0.4, 0.5]})
     assert made.summary["ranking"] == []
-    assert str(made).startswith(
-        "mud: permeability lost 40.0 % (95 % band 15.2 to 64.8 %), 3 seeds"
-    )
+    said = "mud: permeability lost 40.0 % (95 % band 15.2 to 64.8 %), 3 seeds"
+    assert str(made).startswith(said)
     page = (made.path / "compare.html").read_text()
     assert "Rank" not in page
     assert "best first" not in page
@@ -149,9 +144,9 @@ def test_runs_open_as_one_object_with_bands_by_quantity_and_by_depth(tmp_path):
     half = 4.302653 / math.sqrt(3)
     names = ("section", "x_lo_m", "x_hi_m", "porosity_initial", "porosity_damaged", "k_initial_m2")
     names += ("k_damaged_m2", "k_reduction", "fines_count", *IN_PLACE)
+    edges = ((1, 0.0, 1e-3), (2, 1e-3, 2e-3))
     for seed in (1, 2, 3):
         k = (1e-11, seed * 1e-11, 0.5, 4, 1e-11, seed * 1e-11)
-        edges = ((1, 0.0, 1e-3), (2, 1e-3, 2e-3))
         rows = [dict(zip(names, (*own, 0.4, 0.3, *k), strict=True)) for own in edges]
         finished_run(tmp_path / f"r{seed}", tiny(f"seed={seed}"), skin=float(seed), sections=rows)
     runs = fdnet.open_runs(tmp_path)
@@ -160,10 +155,7 @@ def test_runs_open_as_one_object_with_bands_by_quantity_and_by_depth(tmp_path):
     assert [*row] == pytest.approx([2, 2 - half, 2 + half, 3], rel=1e-6)
     depth = runs.by_depth()
     assert "section_low" not in depth
-    assert depth[["section", "x_lo_m", "x_hi_m"]].to_numpy().tolist() == [
-        [1, 0, 1e-3],
-        [2, 1e-3, 2e-3],
-    ]
+    assert depth[["section", "x_lo_m", "x_hi_m"]].to_numpy().tolist() == [*map(list, edges)]
     assert depth["k_damaged_m2"].tolist() == pytest.approx([2e-11] * 2, rel=1e-12)
     high = depth["k_damaged_m2_high"].tolist()
     assert high == pytest.approx([(2 + half) * 1e-11] * 2, rel=1e-6)
@@ -178,15 +170,6 @@ def test_runs_open_as_one_object_with_bands_by_quantity_and_by_depth(tmp_path):
     # 2e-11 and 2.484e-11 m2 over 9.86923e-16
     assert "20,260 mD<br>\n<small>0 to 45,440 mD, cut at 0 mD</small>" in page
     assert page.count("data:image/svg+xml") == 1
-
-
-def test_runs_of_several_variants_open_by_variant(tmp_path):
-    compared(tmp_path, {"a": [0.1, 0.3], "b": [0.6, 0.8]})
-    runs = fdnet.open_runs(tmp_path / "made")
-    assert runs.mean["a", "k_reduction"] == pytest.approx(0.2)
-    assert runs.band.loc[("b", "k_reduction"), "seeds"] == 2
-    with pytest.raises(fdnet.CaseError, match="does not exist"):
-        fdnet.open_runs(tmp_path / "no")
 
 
 def test_the_tables_are_read_with_their_types(tmp_path):
@@ -204,12 +187,11 @@ def test_the_answer_names_the_variants_that_are_as_good(tmp_path):
     made = compared(tmp_path, values)
     page = " ".join((made.path / "compare.html").read_text().split())
     assert "the smallest mean, but these seeds do not tell it apart from b.</p>" in page
+    runs = fdnet.open_runs(tmp_path / "made")
+    assert runs.mean["a", "k_reduction"] == pytest.approx(0.31)
+    assert runs.band.loc[("b", "k_reduction"), "seeds"] == 3
+    with pytest.raises(fdnet.CaseError, match="does not exist"):
+        fdnet.open_runs(tmp_path / "no")
     apart = compared(tmp_path / "two", {"a": values["a"], "c": values["c"]})
     page = (apart.path / "compare.html").read_text()
     assert "It is the smallest, and differs from every other variant." in page
-
-
-def test_two_single_runs_say_nothing_of_their_packs(tmp_path):
-    made = compared(tmp_path, {"a": [0.4], "b": [0.5]})
-    said = "a and b: difference −10.0 % (no band: one run); not distinguished."
-    assert made.differences == (said,)

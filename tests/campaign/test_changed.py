@@ -99,8 +99,7 @@ def test_a_changed_run_is_named_and_not_counted(ensemble, tmp_path, capsys):
 
 def test_a_changed_run_is_left_as_it_is_and_named(ensemble, tmp_path, capsys):
     """No engine starts a job for it: `fdnet run` would refuse it, and Snakemake sees its files."""
-    out = tmp_path / "out"
-    shutil.copytree(ensemble, out)
+    out = shutil.copytree(ensemble, tmp_path / "out")
     summary = out / "runs" / BAD / "summary.json"
     edited(k_reduction=0.999)(summary)
     before = {path: path.stat().st_mtime_ns for path in out.glob("runs/*/*")}
@@ -118,8 +117,7 @@ def test_a_changed_run_is_left_as_it_is_and_named(ensemble, tmp_path, capsys):
 
 
 def test_a_run_without_a_result_is_left_out_with_a_word(ensemble, tmp_path, capsys):
-    out = tmp_path / "out"
-    shutil.copytree(ensemble, out)
+    out = shutil.copytree(ensemble, tmp_path / "out")
     (out / "runs" / BAD / "manifest.json").unlink()
     capsys.readouterr()
     assert main(["compare", str(out), "--json", "--out", str(tmp_path / "c")]) == 0
@@ -130,8 +128,7 @@ def test_a_run_without_a_result_is_left_out_with_a_word(ensemble, tmp_path, caps
 
 def test_a_plan_of_another_shape_is_refused_in_one_line(ensemble, tmp_path, capsys):
     good = (ensemble / "plan.json").read_text()
-    out = tmp_path / "out"
-    shutil.copytree(ensemble, out)
+    out = shutil.copytree(ensemble, tmp_path / "out")
     for spoil in (
         lambda path: path.write_text(""),
         lambda path: path.write_text("[]"),

@@ -17,12 +17,8 @@ from fdnet.campaign.engine import SNAKEFILE, has_snakemake
 from fdnet.cli import main
 from fdnet.errors import CaseError
 
-SNAKEMAKE = pytest.param(
-    *("snakemake", signal.SIGINT),
-    marks=pytest.mark.skipif(
-        not has_snakemake(), reason="Snakemake is not installed (pip install -e '.[dev]')"
-    ),
-)
+needs_snakemake = pytest.mark.skipif(not has_snakemake(), reason="Snakemake is not installed")
+SNAKEMAKE = pytest.param("snakemake", signal.SIGINT, marks=needs_snakemake)
 STAGES = ["--stages", "pack,invade,analyse"]
 VERSION = 'echo "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0)"\n[ "$1" = -h ] && exit 0\n'
 
@@ -36,8 +32,9 @@ def fake_liggghts(path: Path, text: str) -> str:
 
 def words(folder: Path, engine: str, *more: str) -> list[str]:
     """The command line of an ensemble of two seeds in `folder`/out."""
-    (folder / "tiny.toml").write_text(tiny().toml())
-    words = ["ensemble", str(folder / "tiny.toml"), "--seeds", "2", "--out", str(folder / "out")]
+    case = folder / "tiny.toml"
+    case.write_text(tiny().toml())
+    words = ["ensemble", str(case), "--seeds", "2", "--out", str(folder / "out")]
     return [*words, "--engine", engine, "--jobs", "2", *STAGES, *more]
 
 
@@ -71,7 +68,7 @@ def _lives(number: int) -> bool:
 
 
 @pytest.mark.liggghts
-@pytest.mark.skipif(not has_snakemake(), reason="Snakemake is not installed")
+@needs_snakemake
 def test_one_call_of_snakemake_ends_by_itself_with_its_page(tmp_path, capsys):
     """Two seeds through the real binary; a second call does nothing, by fdnet or by hand."""
     out = tmp_path / "out"
@@ -94,24 +91,21 @@ def test_one_call_of_snakemake_ends_by_itself_with_its_page(tmp_path, capsys):
     assert {p: p.stat().st_mtime_ns for p in out.glob("runs/*/manifest.json")} == before
 
 
-@pytest.mark.parametrize(("engine", "number"), [("local", signal.SIGTERM), SNAKEMAKE])
+@pytest.mark.parametrize(
+    ("engine", "number"), [("local", signal.SIGTERM), ("local", signal.SIGKILL), SNAKEMAKE]
+)
 def test_a_stop_cancels_the_runs_and_ends_with_130(tmp_path, engine, number):
+    """The pool dies with an fdnet that is killed."""
     process = started(tmp_path, engine)
     process.send_signal(number)
     _, error = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "stopped; what was written is kept" in error
+    killed = number == signal.SIGKILL
+    assert process.returncode == (-number if killed else 130)
+    assert killed or "stopped; what was written is kept" in error
     assert alive(tmp_path) == []
 
 
-def test_the_pool_dies_with_fdnet(tmp_path):
-    process = started(tmp_path, "local")
-    process.kill()
-    process.communicate()
-    assert alive(tmp_path) == []
-
-
-@pytest.mark.skipif(not has_snakemake(), reason="Snakemake is not installed")
+@needs_snakemake
 def test_a_snakemake_that_outlives_fdnet_is_named_and_no_seed_has_failed(tmp_path, capsys):
     """fdnet is killed, then the Snakemake that it left behind; the next call takes over."""
     process = started(tmp_path, "snakemake")
@@ -119,9 +113,8 @@ def test_a_snakemake_that_outlives_fdnet_is_named_and_no_seed_has_failed(tmp_pat
     process.communicate()
     assert main(words(tmp_path, "snakemake")) == 2
     error = capsys.readouterr().err
-    match = re.search(
-        r"Snakemake \(process (\d+) on .* still runs the jobs .*kill -INT -\1", error
-    )
+    said = r"Snakemake \(process (\d+) on .* still runs the jobs .*kill -INT -\1"
+    match = re.search(said, error)
     assert match, error
     assert "failed" not in error
     os.killpg(int(match[1]), signal.SIGKILL)
@@ -135,7 +128,7 @@ def test_a_snakemake_that_outlives_fdnet_is_named_and_no_seed_has_failed(tmp_pat
     assert "ERROR: played" in error
 
 
-@pytest.mark.skipif(not has_snakemake(), reason="Snakemake is not installed")
+@needs_snakemake
 def test_the_lock_of_another_snakemake_is_respected(tmp_path, capsys):
     """One that fdnet did not start: its lock stands without a word in the lock of fdnet."""
     assert main([*words(tmp_path, "snakemake"), "--gather"]) == 5
@@ -151,7 +144,7 @@ def test_the_lock_of_another_snakemake_is_respected(tmp_path, capsys):
 
 
 @pytest.mark.nightly
-@pytest.mark.skipif(not has_snakemake(), reason="Snakemake is not installed")
+@needs_snakemake
 def test_resources_reach_sbatch_as_they_are_and_its_reason_the_user(tmp_path, capsys, monkeypatch):
     """A stand-in for sbatch keeps its words and refuses; nothing that a user names is run."""
     pytest.importorskip("snakemake_executor_plugin_slurm")
@@ -185,6 +178,9 @@ def test_resources_that_are_no_words_are_refused(tmp_path, capsys, monkeypatch):
         assert "--slurm: " in capsys.readouterr().err
     assert main(words(tmp_path, "local", "--slurm", "runtime=1")) == 2
     assert main(words(tmp_path, "local", "--jobs", "0")) == 2
+    with pytest.raises(CaseError, match="'cluster', expected one of local"):
+        fdnet.ensemble(tiny(), out=tmp_path / "no", engine="cluster")
+    assert not (tmp_path / "no").exists()
 
 
 def test_a_run_that_is_killed_says_so_and_stops_no_other(tmp_path, capsys):
@@ -195,16 +191,6 @@ def test_a_run_that_is_killed_says_so_and_stops_no_other(tmp_path, capsys):
     error = capsys.readouterr().err
     assert "tiny-seed-1 failed: ended by signal 9 (SIGKILL), perhaps for want of memory" in error
     assert re.search(r"tiny-seed-2 failed: .*ERROR: played", error)
-
-
-def test_an_engine_and_jobs_that_cannot_be_are_refused(tmp_path):
-    for how, message in (
-        ({"engine": "cluster"}, "'cluster', expected one of local"),
-        ({"jobs": 0}, "jobs: 0 runs"),
-    ):
-        with pytest.raises(CaseError, match=message):
-            fdnet.ensemble(tiny(), out=tmp_path / "out", **how)
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(("engine", "_"), [("local", 0), SNAKEMAKE])

@@ -64,13 +64,8 @@ def chain(count, *, step=1.0, void=1e-3, surface=1.0, passage=1.0):
 
 def through(sieve):
     count = len(sieve.void)
-    return streams_of(
-        sieve.ends,
-        np.ones(count - 1),
-        np.linspace(1, 0, count),
-        inlet=sieve.inlet,
-        outlet=sieve.outlet,
-    )
+    faces = {"inlet": sieve.inlet, "outlet": sieve.outlet}
+    return streams_of(sieve.ends, np.ones(count - 1), np.linspace(1, 0, count), **faces)
 
 
 def step(sieve, solids, classes, streams, filtering, filtrate):
@@ -81,9 +76,8 @@ def step(sieve, solids, classes, streams, filtering, filtrate):
 def test_one_rate_in_a_chain_falls_exponentially():
     """c = c0 exp(-lambda x) (Iwasaki 1937) once the fluid of the chain is renewed."""
     sieve, classes = chain(40, void=1e-12), sizes(1e-6)
-    carried, _ = step(
-        sieve, no_solids(sieve, classes), classes, through(sieve), np.array([0.11]), 1.0
-    )
+    solids, streams = no_solids(sieve, classes), through(sieve)
+    carried, _ = step(sieve, solids, classes, streams, np.array([0.11]), 1.0)
     expected = classes.concentration * np.exp(-0.11 * sieve.place[:-1, 0])
     assert carried.concentration[:-1, 0] == pytest.approx(expected, rel=1e-9)
 
@@ -161,17 +155,14 @@ def test_contact_efficiency_of_a_colloid():
 
 def test_a_class_is_strained_by_the_share_that_is_too_wide():
     classes = replace(sizes(1.0), low=np.array([1.0]), high=np.array([4.0]))
-    assert wider_share(classes, np.array([0.5, 1.0, 2.0, 4.0, 9.0]))[:, 0] == pytest.approx(
-        [1.0, 1.0, 0.5, 0.0, 0.0], abs=1e-12
-    )
+    wider = wider_share(classes, np.array([0.5, 1.0, 2.0, 4.0, 9.0]))[:, 0]
+    assert wider == pytest.approx([1.0, 1.0, 0.5, 0.0, 0.0], abs=1e-12)
 
 
 def test_classes_hold_all_solids_of_the_mud():
     """Also what the cut of the case leaves out, and the tails of its curve."""
-    fines = Fines.model_validate(
-        {"sizes": {"D10_mm": 0.005, "D50_mm": 0.025, "D90_mm": 0.07}, "cut_um": 40.0}
-    )
-    classes = mud_classes(fines, 8)
+    curve = {"D10_mm": 0.005, "D50_mm": 0.025, "D90_mm": 0.07}
+    classes = mud_classes(Fines.model_validate({"sizes": curve, "cut_um": 40.0}), 8)
     assert classes.concentration.sum() == pytest.approx(0.10, rel=1e-12)
     assert len(classes.low) == 8
     assert classes.low[0] < 5e-6
@@ -180,10 +171,7 @@ def test_classes_hold_all_solids_of_the_mud():
     assert one.diameter == pytest.approx([1e-4])
 
 
-# ------------------------------------------------------------------------------------------------
-# On the network of a random pack.
-
-
+# ---- On the network of a random pack.
 def pack(order=None):
     grains = random_pack(60, aspect=1.5)
     if order is not None:
@@ -197,19 +185,10 @@ def pack(order=None):
 
 def course(sieve, **keys):
     given = {
-        "velocity": 1e-3,
-        "resistance": 1e3,
-        "rest": 0.0,
-        "at_rate": False,
-        "cake_permeability": None,
-        "duration": None,
-        "plug_rate": 0.05,
-        "plug_time": 200.0,
-        "cap_time": 1e6,
+        **{"velocity": 1e-3, "resistance": 1e3, "rest": 0.0, "at_rate": False},
+        **{"plug_rate": 0.05, "plug_time": 200.0, "cap_time": 1e6, "sticking": 0.0, "bed": BED},
+        **dict.fromkeys(("cake_permeability", "duration", "release")),
         "supply": 0.5 * float(sieve.void.sum()),
-        "sticking": 0.0,
-        "release": None,
-        "bed": BED,
     }
     return Course(**given | keys)
 
@@ -245,9 +224,8 @@ def test_the_numbers_of_the_grains_do_not_matter():
         for one, way in ((sieve, flow), (other, flow_there))
     )
     for name in ("cake", "passed", "supplied"):
-        assert getattr(first.solids, name) == pytest.approx(
-            getattr(second.solids, name), rel=1e-6, abs=1e-9
-        )
+        there = pytest.approx(getattr(second.solids, name), rel=1e-6, abs=1e-9)
+        assert getattr(first.solids, name) == there, name
     assert first.rows[-1]["k_over_k0"] == pytest.approx(second.rows[-1]["k_over_k0"], rel=1e-6)
 
 

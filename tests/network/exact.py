@@ -29,17 +29,12 @@ def exact_balance(ends: Array, conductance: Array, jump: Array, count: int) -> t
                     rows[below][column] -= share * rows[pivot][column]
     p = [Fraction(0)] * count
     for row in reversed(range(count)):
-        rest = sum(
-            (rows[row][column] * p[column] for column in range(row + 1, count)), Fraction(0)
-        )
+        rest = sum(rows[row][column] * p[column] for column in range(row + 1, count))
         p[row] = (rows[row][count] - rest) / rows[row][row]
-    flux = [
-        value * (p[a] - p[b] + push)
-        for (a, b), value, push in zip(ends.tolist(), g, drive, strict=True)
-    ]
-    return float(sum(f * push for f, push in zip(flux, drive, strict=True))), np.array(
-        [float(f) for f in flux]
-    )
+    links = zip(ends.tolist(), g, drive, strict=True)
+    flux = [value * (p[a] - p[b] + push) for (a, b), value, push in links]
+    throughput = sum(one * push for one, push in zip(flux, drive, strict=True))
+    return float(throughput), np.array([float(one) for one in flux])
 
 
 def random_links(

@@ -34,9 +34,7 @@ def network_of(
         "pore_position": position,
         "pore_radius": np.full(pores, radius),
         "pore_power_centre": position,
-        "pore_tetra_volume": np.ones(pores),
-        "pore_volume": np.ones(pores),
-        "pore_wall_surface": np.ones(pores),
+        **dict.fromkeys(("pore_tetra_volume", "pore_volume", "pore_wall_surface"), np.ones(pores)),
         "pore_share": np.ones(pores),
         "pore_group": np.arange(pores),
         "throat_pores": pairs,
@@ -50,18 +48,14 @@ def network_of(
         "throat_length": length,
         "counts": {"grains_outside_box": 0},
     } | given
-    return Network(
-        **{
-            name: frozen(value) if isinstance(value, np.ndarray) else value
-            for name, value in fields.items()
-        }
-    )
+    for name, value in fields.items():
+        fields[name] = frozen(value) if isinstance(value, np.ndarray) else value
+    return Network(**fields)
 
 
 def chain(count: int, *, step: float = 1.0) -> Network:
     """`count` throats in a row along x, the first and last pore on the faces."""
-    position = np.stack(
-        [np.arange(count + 1) * step, np.full(count + 1, 0.5), np.full(count + 1, 0.5)], axis=1
-    )
+    position = np.full((count + 1, 3), 0.5)
+    position[:, 0] = np.arange(count + 1) * step
     pairs = np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
     return network_of(position, pairs, [[0, count * step], [0, 1], [0, 1]])

@@ -16,10 +16,8 @@ def snapshot(
 
 def lattice(cell: list[list[float]], edge: float, repeat: int, radius: float) -> Snapshot:
     """`repeat` cubic cells each way; `cell` holds positions in units of the cell edge."""
-    steps = np.stack(np.meshgrid(*[np.arange(repeat)] * 3, indexing="ij"), axis=-1).reshape(
-        -1, 1, 3
-    )
-    position = ((steps + np.array(cell) + 0.1).reshape(-1, 3)) * edge
+    steps = np.indices((repeat,) * 3).reshape(3, -1).T[:, None]
+    position = (steps + np.array(cell) + 0.1).reshape(-1, 3) * edge
     return snapshot(position, radius, np.array([[0.0, repeat * edge]] * 3))
 
 
@@ -32,12 +30,8 @@ def body_centred(repeat: int = 3, radius: float = 1.0) -> Snapshot:
 
 
 def face_centred(repeat: int = 3, radius: float = 1.0) -> Snapshot:
-    return lattice(
-        [[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]],
-        2.0 * radius * np.sqrt(2.0),
-        repeat,
-        radius,
-    )
+    cell = [[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]]
+    return lattice(cell, 2.0 * radius * np.sqrt(2.0), repeat, radius)
 
 
 @cache
@@ -58,12 +52,8 @@ def random_pack(
     position = rng.random((count, 3)) * size
     for _ in range(600):
         push = _push(position, radius, size, periodic)
-        position = position + 0.5 * push
-        position = (
-            position % size
-            if periodic
-            else np.clip(position, radius[:, None], size - radius[:, None])
-        )
+        moved, reach = position + 0.5 * push, radius[:, None]
+        position = moved % size if periodic else np.clip(moved, reach, size - reach)
         if np.abs(push).max() < 2e-3:
             break
     return snapshot(position, radius, np.stack([np.zeros(3), size], axis=1))
@@ -73,10 +63,9 @@ def _push(position: Array, radius: Array, size: Array, periodic: bool) -> Array:
     apart = position[:, None] - position[None]
     if periodic:
         apart -= size * np.round(apart / size)
-    distance = np.linalg.norm(apart, axis=2) + np.eye(len(position))
-    overlap = np.maximum(radius[:, None] + radius[None] - distance, 0.0) * (
-        1.0 - np.eye(len(position))
-    )
+    itself = np.eye(len(position))
+    distance = np.linalg.norm(apart, axis=2) + itself
+    overlap = np.maximum(radius[:, None] + radius[None] - distance, 0.0) * (1.0 - itself)
     return np.sum((overlap / distance)[:, :, None] * apart, axis=1)
 
 
@@ -91,9 +80,8 @@ def with_fines(grains: Snapshot, count: int, radius: float, *, seed: int = 5) ->
     while len(places) < count:
         host = rng.integers(len(grains))
         normal = rng.normal(size=3)
-        place = grains.position[host] + normal / np.linalg.norm(normal) * (
-            grains.radius[host] + radius
-        )
+        normal *= (grains.radius[host] + radius) / np.linalg.norm(normal)
+        place = grains.position[host] + normal
         place = grains.box[:, 0] + (place - grains.box[:, 0]) % size
         apart = grains.position - place
         apart -= size * np.round(apart / size)

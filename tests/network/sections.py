@@ -12,14 +12,8 @@ from scipy.optimize import fsolve
 from scipy.sparse.linalg import splu, spsolve
 from scipy.spatial import Delaunay
 
-from fdnet.network.laws.cross_section import (
-    HUGE,
-    MOST_BODIES,
-    OPEN,
-    Sections,
-    Shapes,
-    section_fluxes,
-)
+from fdnet.network.laws import cross_section
+from fdnet.network.laws.cross_section import HUGE, Sections, Shapes, section_fluxes
 from fdnet.network.laws.reaching_grains import SpheresBeside
 from fdnet.spheres.snapshot import Array
 
@@ -30,19 +24,18 @@ def polygon_flux(corner: Any, discs: Any, walls: Any = (), middle: Any = None) -
     The `walls` are discs of `HUGE` radii. The rays of a disc are divided at the `middle` (2,) m.
     """
     corner, bodies = np.array(corner, float), np.array([*discs, *walls], float)
-    four, body = np.zeros((1, 4, 2)), np.zeros((1, MOST_BODIES, 5))
+    four, body = np.zeros((1, 4, 2)), np.zeros((1, cross_section.MOST_BODIES, 5))
     four[0, : len(corner)] = corner
     others = np.insert(bodies, 2, 0.0, axis=1)
     flatness = np.repeat([1.0, 0.0], [len(discs), len(walls)])
-    around = SpheresBeside(
-        first=np.array([0, len(others)]), place=np.column_stack([others, flatness])
-    )
+    beside = np.column_stack([others, flatness])
+    around = SpheresBeside(first=np.array([0, len(others)]), place=beside)
     place = corner.mean(axis=0) if middle is None else middle
     count = np.array([len(corner)])
     shapes = Shapes(four, count, body, np.ones(1), np.array([place], float))
     none, side = np.zeros(1), np.zeros(1, int)
     sections = Sections(throat=side, side=side, low=none, step=none, many=1)
-    return float(section_fluxes(shapes, sections, around, OPEN)[0][0, 0])
+    return float(section_fluxes(shapes, sections, around, cross_section.OPEN)[0][0, 0])
 
 
 def disc_flux(base: Array, disc: Array) -> float:
@@ -80,10 +73,7 @@ def edge_flux(place: Any, disc: float) -> float:
     return polygon_flux(corner, [(0.0, high, disc)], walls)
 
 
-# ------------------------------------------------------------------------------------------------
-# Triangles with discs, by finite elements on a free mesh.
-
-
+# ---- Triangles with discs, by finite elements on a free mesh.
 def resolved_flux(
     base: Array, disc: Array, nodes: int = 800, *, centre: Array | None = None
 ) -> float:
@@ -137,9 +127,8 @@ def _inside(point: Array, base: Array) -> Array:
 def _points(base: Array, centre: Array, disc: Array, size: float) -> tuple[Array, Array]:
     """Free points, in a triangular grid and on the sides, and held ones on the rims."""
     low, high = base.min(axis=0) - size, base.max(axis=0) + size
-    x, y = np.meshgrid(
-        np.arange(low[0], high[0], size), np.arange(low[1], high[1], size * np.sqrt(0.75))
-    )
+    across = np.arange(low[1], high[1], size * np.sqrt(0.75))
+    x, y = np.meshgrid(np.arange(low[0], high[0], size), across)
     x = x + 0.5 * size * (np.arange(len(x)) % 2)[:, None]
     grid = np.column_stack([x.ravel(), y.ravel()])
     free = [grid[(_inside(grid, base) > 0.45 * size) & (_gap(grid, centre, disc) > 0.55 * size)]]
@@ -166,10 +155,7 @@ def _points(base: Array, centre: Array, disc: Array, size: float) -> tuple[Array
     return np.concatenate(free), rim[_gap(rim, centre, disc) > -1e-9 * np.ptp(base)]
 
 
-# ------------------------------------------------------------------------------------------------
-# Sections that side walls hold, by finite differences.
-
-
+# ---- Sections that side walls hold, by finite differences.
 @cache
 def resolved_beside_walls(place: Any, disc: Any, cells: int = 200, *, edge: bool = False) -> float:
     """Flux m4 in a trapezoid: w = 0 on the wall and on two discs, no shear on the other sides.
@@ -178,9 +164,8 @@ def resolved_beside_walls(place: Any, disc: Any, cells: int = 200, *, edge: bool
     would be, and the trapezoid is a rectangle.
     """
     step = place[2] / cells
-    x, y = np.meshgrid(
-        (np.arange(cells) + 0.5) * step, np.arange(step / 2, max(place[:2]), step), indexing="ij"
-    )
+    up = np.arange(step / 2, max(place[:2]), step)
+    x, y = np.meshgrid((np.arange(cells) + 0.5) * step, up, indexing="ij")
     first = x**2 + (y - place[0]) ** 2 < disc[0] ** 2
     solid = first | ((x - place[2]) ** 2 + (y - place[1]) ** 2 < disc[1] ** 2)
     inside = y < place[0] + (place[1] - place[0]) * x / place[2]

@@ -30,9 +30,8 @@ def as_cake(bed: Snapshot, *, lone: bool = False) -> Snapshot:
     position = np.concatenate([places, places - [size[0], 0.0, 0.0], far])
     kind = np.where(np.arange(len(position)) < len(places), Kind.GRAIN, Kind.FINE)
     radius = np.concatenate([bed.radius, bed.radius, np.full(len(far), bed.radius.max())])
-    return Snapshot.from_arrays(
-        position, radius, box=np.column_stack([np.zeros(3), size]), kind=kind
-    )
+    box = np.column_stack([np.zeros(3), size])
+    return Snapshot.from_arrays(position, radius, box=box, kind=kind)
 
 
 def test_a_cubic_bed_has_the_permeability_of_zick_and_homsy():
@@ -55,9 +54,8 @@ def test_a_cubic_bed_has_the_permeability_of_zick_and_homsy():
 def test_what_is_thin_or_hangs_by_one_contact_is_no_cake_yet():
     thin = cake_summary(measure_cake(as_cake(simple_cubic(repeat=2)), SIDES), 1.0)
     assert thin["cake"]["k_m2"] is None
-    assert thin["cake"]["no_cake_yet"] == (
-        "no cake yet: packed for 2.0 diameters of a fine, 3 are needed"
-    )
+    said = "no cake yet: packed for 2.0 diameters of a fine, 3 are needed"
+    assert thin["cake"]["no_cake_yet"] == said
     assert "no cake yet" in cake_words(thin)
     place = np.ones((9, 3))
     place[:, 0] = 0.5 - np.arange(9)  # eight in a row before a grain
@@ -80,10 +78,7 @@ def test_cakes_that_liggghts_made_resist_as_resolved_flow_does(name):
     assert 0.40 < cake.packed_porosity < 0.50
 
 
-# ------------------------------------------------------------------------------------------------
-# Throats that fines bridge.
-
-
+# ---- Throats that fines bridge.
 def test_wilsons_band():
     """Values of Brown, Cai and DasGupta (2001), and Newcombe (1998) for 81 of 263."""
     for hits, trials, band in [

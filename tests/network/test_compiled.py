@@ -21,15 +21,8 @@ from tests.network.packs import random_pack, with_fines
 def call(command, folder, **settings):
     environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")} | settings
     environment.pop("NUMBA_CACHE_DIR", None)
-    return subprocess.run(
-        [sys.executable, *command],
-        env=environment,
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    how = {"env": environment, "cwd": folder, "capture_output": True, "text": True, "timeout": 120}
+    return subprocess.run([sys.executable, *command], check=False, **how)
 
 
 def test_every_state_of_sources_and_settings_has_a_cache_of_its_own(tmp_path, monkeypatch):
@@ -115,10 +108,7 @@ def test_no_function_rounds_other_than_written_whoever_calls_it_first():
         assert function(one, one, one * one) == 0.0
 
 
-# ------------------------------------------------------------------------------------------------
-# Several cores.
-
-
+# ---- Several cores.
 def test_parts_are_done_side_by_side_and_their_results_are_in_order(monkeypatch):
     monkeypatch.setattr(config, "NUMBA_NUM_THREADS", 3)
     meet, done = threading.Barrier(3, timeout=30), []

@@ -25,10 +25,8 @@ def test_a_body_centred_throat_by_the_formulas_on_paper():
     assert network.throat_radius == pytest.approx(circle - 1, rel=1e-6)
     assert network.throat_area == pytest.approx(area - np.pi / 2, rel=1e-6)
     assert network.throat_length == pytest.approx(np.sqrt(2 / 3), rel=1e-5)
-    for law, radius in [
-        ("thesis", circle - 1),
-        ("effective", np.sqrt((area - np.pi / 2) / np.pi)),
-    ]:
+    effective = np.sqrt((area - np.pi / 2) / np.pi)
+    for law, radius in (("thesis", circle - 1), ("effective", effective)):
         by_hand = np.pi * radius**4 / (8 * np.sqrt(2 / 3))
         assert LAWS[law](network) == pytest.approx(by_hand, rel=1e-4), law
 
@@ -47,10 +45,6 @@ def test_thin_slabs_against_resolved_stokes_flow():
         network = build_network(cut_out(pack, span, SIDES), periodic=SIDES)
         k = whole_permeability(network, 1.0 / half_resistances(network).sum(axis=1))[0]
         assert k == pytest.approx(exact, rel=error), (count, more, share)
-
-
-# ------------------------------------------------------------------------------------------------
-# Side walls that hold the fluid.
 
 
 # ---- Throats that fines bound, in the network of all spheres.

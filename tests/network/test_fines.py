@@ -29,10 +29,8 @@ from tests.network.packs import random_pack, snapshot, with_fines
 ALL, NONE = (True,) * 3, (False,) * 3
 BALL, SPHERE = 4 / 3 * np.pi, 4 * np.pi
 
-# ------------------------------------------------------------------------------------------------
-# Pieces of balls in tetrahedra, and parts of tetrahedra in a box.
 
-
+# ---- Pieces of balls in tetrahedra, and parts of tetrahedra in a box.
 def piece(corner, centre, radius=1.0):
     """Volume and surface of the ball in the tetrahedron."""
     one = np.zeros(1, np.intp)
@@ -72,11 +70,8 @@ def pairs_in_space():
     """Tetrahedra and balls, seven in eight of them degenerate."""
     rng = np.random.default_rng(4)
     for k in range(4000):
-        corner, centre, radius = (
-            rng.normal(size=(4, 3)),
-            0.7 * rng.normal(size=3),
-            rng.uniform(0.1, 1.5),
-        )
+        corner, centre = rng.normal(size=(4, 3)), 0.7 * rng.normal(size=3)
+        radius = rng.uniform(0.1, 1.5)
         share, noise = rng.uniform(-1, 2), 1e-7 * rng.normal(size=3)
         match k % 8:
             case 1:  # flat
@@ -115,10 +110,7 @@ def test_parts_of_tetrahedra_in_a_box():
     assert sum(parts) == pytest.approx(np.abs(signed_volume(many)), rel=1e-9)
 
 
-# ------------------------------------------------------------------------------------------------
-# Spheres in the tube of a throat.
-
-
+# ---- Spheres in the tube of a throat.
 def pairs_of(rows):
     names = ("sphere", "offset", "depth", "tube", "length")
     return Pairs(**dict(zip(names, np.atleast_2d(rows).T, strict=True)))
@@ -196,10 +188,7 @@ def test_throat_volumes_are_those_of_every_pair_taken_alone():
     assert (volumes > 0).sum() > 20
 
 
-# ------------------------------------------------------------------------------------------------
-# Fines in pores.
-
-
+# ---- Fines in pores.
 def volume_inside(fines, periodic):
     """Volume of balls on this side of the walls, by 20,000 points in each that a wall may cut."""
     point = np.random.default_rng(2).normal(size=(20_000, 3))
@@ -229,10 +218,7 @@ def test_every_fine_in_the_box_counts_once():
                 assert surface == pytest.approx(200 * SPHERE * 0.2**2, rel=1e-7)
 
 
-# ------------------------------------------------------------------------------------------------
-# The cake before the formation face.
-
-
+# ---- The cake before the formation face.
 def cake_thickness(fines, *, periodic=NONE):
     """Of fines of radius 0.1 before a grain of radius 1 whose front is at x = 0."""
     place = np.vstack([[[1.0, 2, 2]], np.array(fines, float).reshape(-1, 3)])
@@ -258,9 +244,7 @@ def test_the_cake_is_what_stands_on_the_pack():
     assert cake_thickness(rounded, periodic=sides) == pytest.approx(0.2)
 
 
-# ------------------------------------------------------------------------------------------------
-# The porosity of the crowd around a fine.
-
+# ---- The porosity of the crowd around a fine.
 BOX = np.array([[0.0, 1.0]] * 3)
 CROSSWISE = (False, True, True)
 

@@ -33,19 +33,16 @@ def test_sections_in_place_recombine_in_series(pack):
         for periodic in (ALL, FLOW_X, WALLED):
             analysis = analysed(pack, periodic, sections=sections)
             for state in ("initial", "damaged"):
-                resistance = [
-                    (one.x_hi - one.x_lo) / getattr(one, f"k_{state}_inplace")
-                    for one in analysis.sections
-                ]
+                name, rows = f"k_{state}_inplace", analysis.sections
+                resistance = [(one.x_hi - one.x_lo) / getattr(one, name) for one in rows]
                 k = getattr(analysis, f"k_{state}")
                 assert length / sum(resistance) == pytest.approx(k, rel=1e-9), periodic
                 assert min(resistance) > 0
     # shifted by half a period the two halves change places; all in-place values stay
     moved = pack.position.copy()
     moved[:, 0] = (moved[:, 0] + 0.5 * length) % length
-    here, there = (
-        analysed(one, ALL, sections=2).sections for one in (pack, replace(pack, position=moved))
-    )
+    both = pack, replace(pack, position=moved)
+    here, there = (analysed(one, ALL, sections=2).sections for one in both)
     assert abs(here[0].k_damaged_inplace / here[1].k_damaged_inplace - 1) > 0.01
     for name in ("k_initial_inplace", "k_damaged_inplace"):
         first, second = ([getattr(s, name) for s in one] for one in (here, there[::-1]))
@@ -55,10 +52,8 @@ def test_sections_in_place_recombine_in_series(pack):
 def test_damage_shows_in_the_section_that_holds_the_fines(pack):
     fines = pack.fines()
     near = fines.where(fines.position[:, 0] < 0.2 * pack.box[0, 1])
-    analysis, x = (
-        analysed(pack.grains().joined(near), laws=ARCHIE, sections=4),
-        near.position[:, 0],
-    )
+    analysis = analysed(pack.grains().joined(near), laws=ARCHIE, sections=4)
+    x = near.position[:, 0]
     reduction = [one.k_reduction for one in analysis.sections]
     assert reduction[0] > 0.1
     assert reduction[2] == reduction[3] == 0.0

@@ -19,10 +19,7 @@ RIGHT_ISOSCELES = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 2.0]])
 ACUTE = np.array([[0.0, 0.0], [2.0, 0.0], [1.1175, 1.7808]])
 
 
-# ------------------------------------------------------------------------------------------------
-# Wedges and the rule of tubes.
-
-
+# ---- Wedges and the rule of tubes.
 def test_the_table_is_the_series_of_sparrow_and_loeffler():
     """Rays are an upper bound; between its points the table is good to a thousandth."""
     table = wedges.ratio_table()
@@ -53,10 +50,7 @@ def test_the_rule_of_tubes_against_the_exact_hyperboloid():
         assert 2.0 * total == pytest.approx(3 / ((1 - q) ** 2 * (1 + 2 * q)), rel=bound), q
 
 
-# ------------------------------------------------------------------------------------------------
-# Sections between three grains.
-
-
+# ---- Sections between three grains.
 def test_sections_of_equal_wedges():
     """Six of 30 degrees in an equilateral triangle, four of 45 in half a square."""
     exact = 6.0 * exact_flux(np.pi / 6.0, 0.9)
@@ -102,10 +96,7 @@ def test_unequal_discs_against_finite_elements():
     assert disc_flux(2.0 * EQUAL_SIDES, np.full(3, 1.2)) == 0.0
 
 
-# ------------------------------------------------------------------------------------------------
-# Sections beside walls that hold the fluid.
-
-
+# ---- Sections beside walls that hold the fluid.
 def test_half_sections_of_a_wall_against_finite_differences():
     cases = {
         "touching all": ((1.0, 1.0, 2.0), (1.0, 1.0)),
@@ -131,10 +122,7 @@ def test_quarter_sections_of_an_edge_against_finite_differences():
     assert edge_flux((1.0, 1.0), 1.4) > 0.0
 
 
-# ------------------------------------------------------------------------------------------------
-# Sections among fines, of which some stand beyond the triangle.
-
-
+# ---- Sections among fines, of which some stand beyond the triangle.
 def lattice(radii):
     """Discs on a triangular lattice, of three radii in turn, that surround `EQUAL_SIDES`."""
     steps = np.array([(i, j) for i in range(-4, 6) for j in range(-4, 6)])

@@ -134,9 +134,8 @@ def test_void_of_packs_is_their_porosity_by_chords():
 def test_tetrahedra_tile_the_box_and_facets_pair():
     """Also few grains in a wide box, where the first images are too few, and a single layer."""
     dense = random_pack(120, 0.5, periodic=False)
-    few = [
-        random_pack(n, 0.2, seed=seed, spread=0.3, aspect=0.6) for seed, n in ((2, 12), (4, 19))
-    ]
+    wide = {"spread": 0.3, "aspect": 0.6}
+    few = [random_pack(12, 0.2, seed=2, **wide), random_pack(19, 0.2, seed=4, **wide)]
     layer = snapshot(np.random.default_rng(0).random((9, 3)) * [8, 8, 0] + 1, 0.1, [[0, 10]] * 3)
     cases = [(dense, sides) for sides in (ALL, SIDES, ONE_WALL, NONE)] + [(layer, NONE)]
     for pack, periodic in cases + list(product(few, (ALL, SIDES, ONE_WALL))):
@@ -148,19 +147,14 @@ def test_tetrahedra_tile_the_box_and_facets_pair():
             continue
         # Delaunay: centres in order along the normal; one place for all parts of a polyhedron
         assert network.throat_heights.sum(axis=1).min() > -1e-9
-        places, groups = (
-            len(np.unique(network.pore_position, axis=0)),
-            network.pore_group.max() + 1,
-        )
+        places = len(np.unique(network.pore_position, axis=0))
+        groups = network.pore_group.max() + 1
         assert 0.99 * groups < places <= groups
         if periodic == ALL:
             assert len(network.throat_pores) == 2 * len(network.pore_position)
 
 
-# ------------------------------------------------------------------------------------------------
-# Power tessellation.
-
-
+# ---- Power tessellation.
 def test_no_other_grain_has_less_power_at_a_power_centre():
     pack, network = random_pack(80, spread=0.33), built(80, spread=0.33)
     steps = (np.indices((3, 3, 3)).reshape(3, -1).T - 1) * pack.box[:, 1]
@@ -174,27 +168,18 @@ def test_no_other_grain_has_less_power_at_a_power_centre():
 def test_a_lattice_of_thousands_of_grains_conducts_as_a_few_cells():
     """Qhull joins what it cannot tell apart in a large set; the shake keeps lattices apart."""
     for made in (simple_cubic, body_centred, face_centred):
-        k = [
-            whole_permeability(network, LAWS["lubrication"](network))[0]
-            for network in (build_network(made(n), periodic=ALL) for n in (3, 10))
-        ]
+        few, many = (build_network(made(n), periodic=ALL) for n in (3, 10))
+        k = [whole_permeability(one, LAWS["lubrication"](one))[0] for one in (few, many)]
         assert k[1] == pytest.approx(k[0], rel=1e-9)
 
 
-# ------------------------------------------------------------------------------------------------
-# Nodes: power centres, or the points of their tetrahedra that are nearest to them.
-
-
+# ---- Nodes: power centres, or the points of their tetrahedra that are nearest to them.
 def nearest_by_search(corner, place):
     """The point of a tetrahedron nearest to a place, from weights that are searched for."""
-    result = minimize(
-        lambda weight: np.sum((weight @ corner - place) ** 2),
-        np.full(4, 0.25),
-        bounds=[(0.0, 1.0)] * 4,
-        constraints={"type": "eq", "fun": lambda weight: weight.sum() - 1.0},
-        options={"ftol": 1e-14, "maxiter": 500},
-    )
-    return result.x @ corner
+    whole = {"type": "eq", "fun": lambda weight: weight.sum() - 1.0}
+    how = {"bounds": [(0.0, 1.0)] * 4, "options": {"ftol": 1e-14, "maxiter": 500}}
+    away = lambda weight: np.sum((weight @ corner - place) ** 2)  # noqa: E731
+    return minimize(away, np.full(4, 0.25), constraints=whole, **how).x @ corner
 
 
 def inside(corner, place):

@@ -34,9 +34,8 @@ def test_the_permeability_is_that_of_the_reference_solver_on_the_same_grid():
     current = field("xyz")
     cells = current.lattice.shape[0]
     assert current.lattice.shape == (cells,) * 3
-    assert current.k == pytest.approx(
-        solve_stokes(pack(), cells=cells, tolerance=1e-6).k, rel=2e-3
-    )
+    k = solve_stokes(pack(), cells=cells, tolerance=1e-6).k
+    assert current.k == pytest.approx(k, rel=2e-3)
 
 
 def test_plane_walls_without_a_grain_give_the_parabola_of_poiseuille():
@@ -90,12 +89,8 @@ def test_periods_turns_and_units_change_nothing():
     assert current.at(points() + size * [3, -2, 1]) == pytest.approx(u, abs=1e-5)
     assert np.count_nonzero(np.any(u, axis=1)) == pytest.approx(0.42 * 2000, rel=0.1)
     turn = [0, 2, 1]  # y and z change places, and a pack in metres is one in millimetres
-    turned = replace(
-        pack(),
-        position=1e-3 * pack().position[:, turn],
-        box=1e-3 * pack().box[turn],
-        radius=1e-3 * pack().radius,
-    )
+    turned = replace(pack(), position=1e-3 * pack().position[:, turn])
+    turned = replace(turned, box=1e-3 * pack().box[turn], radius=1e-3 * pack().radius)
     other = fdnet.velocity_field(turned, periodic="yz", cells=6.0, tolerance=0.01)
     difference = other.at(1e-3 * points()[:, turn])[:, turn] - field("yz").at(points())
     assert np.sqrt((difference**2).mean()) < 0.005
@@ -104,12 +99,10 @@ def test_periods_turns_and_units_change_nothing():
 
 
 def test_a_finer_grid_is_closer():
-    fine = field("xyz", 20.0).at(points())
+    fine, coarse = field("xyz", 20.0).at(points()), [field("xyz", n).at(points()) for n in (6, 10)]
     speed = np.linalg.norm(fine, axis=1)[np.any(fine, axis=1)].mean()
-    errors = [
-        np.sqrt(np.mean(np.sum((field("xyz", n).at(points()) - fine) ** 2, axis=1)) / 0.42) / speed
-        for n in (6.0, 10.0)
-    ]
+    squares = [np.mean(np.sum((one - fine) ** 2, axis=1)) / 0.42 for one in coarse]
+    errors = np.sqrt(squares) / speed
     assert errors[1] < 0.16
     assert errors[1] < 0.6 * errors[0] < 0.2
 
@@ -131,14 +124,16 @@ def test_fines_turn_the_flow_and_those_off_the_grid_are_left_out():
 
 
 def test_bad_points_packs_and_cells_are_refused():
-    with pytest.raises(CaseError, match=r"\(2,\).*expected \(N, 3\)"):
-        field("xyz").at([1.0, 2.0])
-    with pytest.raises(CaseError, match="not finite"):
-        field("xyz").at([[1.0, 2.0, np.nan]])
-    with pytest.raises(CaseError, match=r"0\.5 cells"):
-        fdnet.velocity_field(pack(), cells=0.5)
-    with pytest.raises(CaseError, match="no grain"):
-        fdnet.velocity_field(pack().where(np.zeros(16, bool)))
+    for place, said in (
+        ([1.0, 2], r"\(2,\).*expected \(N, 3\)"),
+        ([[1, 2, np.nan]], "not finite"),
+    ):
+        with pytest.raises(CaseError, match=said):
+            field("xyz").at(place)
+    none = pack().where(np.zeros(16, bool))
+    for spheres, cells, said in ((pack(), 0.5, r"0\.5 cells"), (none, 6.0, "no grain")):
+        with pytest.raises(CaseError, match=said):
+            fdnet.velocity_field(spheres, cells=cells)
     far = replace(pack(), position=pack().position + np.array([100.0, 0.0, 0.0]))
     with pytest.raises(NetworkError, match="no wall"):
         fdnet.velocity_field(far, periodic="yz")

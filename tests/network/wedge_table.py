@@ -25,11 +25,8 @@ def exact_flux(angle: float, disc: float, *, terms: int = 24, points: int = 300)
     longest = 1.0 / np.cos(angle)
     log_term = (0.5 * np.tan(angle) - 0.5 * disc**2 * angle) / angle + 0.5 * disc**2
     outward = reach[:, None] ** (order - 1.0) * np.cos((order - 1.0) * turn[:, None])
-    inward = (
-        disc ** (2.0 * order)
-        * reach[:, None] ** (-order - 1.0)
-        * np.cos((order + 1.0) * turn[:, None])
-    )
+    inward = reach[:, None] ** (-order - 1.0) * np.cos((order + 1.0) * turn[:, None])
+    inward = disc ** (2.0 * order) * inward
     slopes = order * (outward + inward) / longest**order
     wanted = np.cos(turn) * (0.5 * reach - log_term / reach)
     weight = np.sqrt(np.sin(np.pi * (np.arange(points) + 0.5) / points))
@@ -40,11 +37,8 @@ def exact_flux(angle: float, disc: float, *, terms: int = 24, points: int = 300)
     r = disc + 0.5 * depth * (1.0 + point)
     speed = 0.25 * (disc**2 - r**2) + log_term * np.log(r / disc)
     for one, by in zip(order, factor, strict=True):
-        speed += (
-            by
-            * ((r / longest) ** one - (disc / longest) ** one * (disc / r) ** one)
-            * np.cos(one * turn)
-        )
+        radial = (r / longest) ** one - (disc / longest) ** one * (disc / r) ** one
+        speed += by * radial * np.cos(one * turn)
     return float(np.sum(0.25 * angle * weight[:, None] * weight * depth * speed * r))
 
 

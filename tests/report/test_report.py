@@ -43,14 +43,15 @@ class Reader(HTMLParser):
             self.text.append(data)
 
 
-def page_of(folder, summary, **parts):
+def read(path):
     reader = Reader()
-    reader.feed(
-        write_report(folder / "report.html", summary, parts=ReportParts(**parts)).read_text(
-            encoding="utf-8"
-        )
-    )
+    reader.feed(path.read_text(encoding="utf-8"))
     assert reader.open == []
+    return reader
+
+
+def page_of(folder, summary, **parts):
+    reader = read(write_report(folder / "report.html", summary, parts=ReportParts(**parts)))
     return reader, re.sub("[ \\n\xa0]+", " ", " ".join(reader.text))
 
 
@@ -73,6 +74,8 @@ def test_nothing_is_taken_for_markup_or_fetched_from_outside(finished, tmp_path)
     assert not any("onclick" in attributes for _, attributes in reader.tags)
     sources = [attributes["src"] for tag, attributes in reader.tags if tag == "img"]
     assert sources == ["data:image/png;base64," + base64.b64encode(PNG).decode()]
+    with pytest.raises(CaseError, match=r"none\.png"):
+        page_of(tmp_path, finished.summary, figures=[(tmp_path / "none.png", "")])
 
 
 def test_a_summary_of_an_intact_pack_or_nothing_at_all_still_makes_a_page(finished, tmp_path):
@@ -99,28 +102,16 @@ def test_text_and_page_say_the_same_numbers_and_words(finished, tmp_path):
     _, page = page_of(tmp_path, said)
     text = "\n".join(summary_lines(said))
     words = re.sub(r"\s+", " ", text)
-    numbers = (
-        summary["answer"],
-        summary["certainty"][0],
+    for part in (
+        *(summary["answer"], summary["certainty"][0], summary["words"]["cake"]),
         in_millidarcy(summary["k_initial_m2"]),
         f"{100 * summary['k_reduction']:.1f} % lost",
-        summary["words"]["cake"],
-    )
-    for part in numbers:
-        assert part in words, part
-        assert part in page, part
-    first = f"{100 * summary['sections'][0]['k_reduction']:.1f}"
-    for part in ("0.8 % of the flow of a well of 108 mm", first):
+        f"{100 * summary['sections'][0]['k_reduction']:.1f}",
+        "0.8 % of the flow of a well of 108 mm",
+    ):
         assert part in words, part
         assert part in page, part
     assert not re.search(r"-0\.0\b", page + words)
-
-
-def test_a_missing_figure_is_named(finished, tmp_path):
-    missing = ReportParts(figures=[(tmp_path / "none.png", "")])
-    with pytest.raises(CaseError, match=r"none\.png"):
-        write_report(tmp_path / "r.html", finished.summary, parts=missing)
-    assert not (tmp_path / "r.html").exists()
 
 
 def test_the_page_of_a_run_has_all_its_figures_and_each_is_drawn(finished, analysed, tmp_path):
@@ -133,18 +124,15 @@ def test_the_page_of_a_run_has_all_its_figures_and_each_is_drawn(finished, analy
         assert tags["path"] >= 6, path
     page = (finished.path / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/svg+xml") == len(paths)
-    assert (
-        page.count("data:image/") - len(paths)
-        == (finished.path / "figures" / "spheres_3d.png").exists()
-    )
+    pictures = page.count("data:image/") - len(paths)
+    assert pictures == (finished.path / "figures" / "spheres_3d.png").exists()
     one, other = (figures.draw_all(tmp_path / name, analysed) for name in ("one", "other"))
     assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
 
 
 def test_only_the_four_parts_stand_open_and_every_link_has_its_place(finished):
     """The answer, the case, depth, and health; all else is folded, each below one line."""
-    reader = Reader()
-    reader.feed((finished.path / "report.html").read_text(encoding="utf-8"))
+    reader = read(finished.path / "report.html")
     places = {attributes.get("id") for _, attributes in reader.tags}
     links = [attributes["href"] for tag, attributes in reader.tags if tag == "a"]
     assert links == ["#case", "#depth", "#health", "#more"]

@@ -9,18 +9,11 @@ from builders import TINY, naming, tiny
 
 from fdnet.case.file import case_from
 from fdnet.errors import CaseError
-from fdnet.scales.contacts import (
-    REFERENCE_OVERLAP,
-    STEP_OVERLAP,
-    elastic,
-    joint_radius,
-    secant_stiffness,
-)
+from fdnet.scales.contacts import STEP_OVERLAP, elastic, joint_radius, secant_stiffness
 from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
 
 HERTZ = "contact.model=hertz"
-
 WET = "contact.restitution=liquid"
 
 
@@ -35,14 +28,12 @@ def test_the_stiffness_of_the_case_is_that_of_the_stiffest_contact_of_a_fine():
     assert used.elastic is not None
     assert used.elastic.modulus == pytest.approx(scales.stiffness_factor * real, rel=1e-12)
     joint = joint_radius(0.05e-3, 0.25e-3)
-    assert used.normal_stiffness == pytest.approx(
-        secant_stiffness(used.elastic.modulus, joint, REFERENCE_OVERLAP * 0.1e-3), rel=1e-12
-    )
+    expected = secant_stiffness(used.elastic.modulus, joint, 0.01 * 0.1e-3)
+    assert used.normal_stiffness == pytest.approx(expected, rel=1e-12)
     assert scales_of(tiny(HERTZ, "run.stiffness_N_m=nominal")).stiffness_factor == 1.0
-    bare = case_from(
-        {k: v for k, v in TINY.items() if k != "fines"} | {"contact": case.data()["contact"]}
-    )
-    alone = [contact.normal_stiffness for contact in scales_of(bare).contacts.values()]
+    bare = {k: v for k, v in TINY.items() if k != "fines"} | {"contact": case.data()["contact"]}
+    contacts = scales_of(case_from(bare)).contacts.values()
+    alone = [contact.normal_stiffness for contact in contacts]
     assert max(alone) == pytest.approx(1e4, rel=1e-12)
 
 
@@ -53,27 +44,22 @@ def test_the_step_resolves_the_tangent_at_four_percent_and_the_usual_bounds():
     and Randall 1988).
     """
     for keys in [(), ("fines.radius_mm=[0.03,0.08]",), ("fines.poissons_ratio=0.5",)]:
-        with naming(keys):
-            case = tiny(HERTZ, "run.time_step_factor=0.2", "fluid.velocity_m_s=2.0", *keys)
-            scales = scales_of(case)
-            low = case.fines.radius_range_m[0]
-            mass = 4 / 3 * math.pi * low**3 * 2146
-            stiffest = max(
-                1.5 * secant_stiffness(contact.elastic.modulus, joint, STEP_OVERLAP * 2 * low)
-                for contact, joint in (
-                    (scales.contacts["grain-fine"], joint_radius(low, 0.25e-3)),
-                    (scales.contacts["fine-fine"], low / 2),
-                    (scales.contacts["fine-wall"], low),
-                )
-            )
-            assert scales.time_step == pytest.approx(0.2 * math.sqrt(mass / stiffest), rel=1e-12)
-            young, poisson = case.fines.youngs_modulus_Pa, case.fines.poissons_ratio
-            shear = scales.stiffness_factor * young / (2 * (1 + poisson))
-            rayleigh = math.pi * low * math.sqrt(2146 / shear) / (0.1631 * poisson + 0.8766)
-            assert scales.time_step < 0.2 * rayleigh
-            assert scales.time_step < 0.1 * min(
-                k.contact_time for name, k in scales.contacts.items() if "fine" in name
-            )
+        case = tiny(HERTZ, "run.time_step_factor=0.2", "fluid.velocity_m_s=2.0", *keys)
+        scales = scales_of(case)
+        low = case.fines.radius_range_m[0]
+        joints = {"grain-fine": joint_radius(low, 0.25e-3), "fine-fine": low / 2, "fine-wall": low}
+        stiffest = 1.5 * max(
+            secant_stiffness(scales.contacts[name].elastic.modulus, joint, STEP_OVERLAP * 2 * low)
+            for name, joint in joints.items()
+        )
+        shortest = math.sqrt(4 / 3 * math.pi * low**3 * 2146 / stiffest)
+        assert scales.time_step == pytest.approx(0.2 * shortest, rel=1e-12), keys
+        young, poisson = case.fines.youngs_modulus_Pa, case.fines.poissons_ratio
+        shear = scales.stiffness_factor * young / (2 * (1 + poisson))
+        rayleigh = math.pi * low * math.sqrt(2146 / shear) / (0.1631 * poisson + 0.8766)
+        assert scales.time_step < 0.2 * rayleigh, keys
+        collision = min(scales.contacts[name].contact_time for name in joints)
+        assert scales.time_step < 0.1 * collision, keys
 
 
 def test_a_key_that_the_model_does_not_read_is_one_clear_problem():
@@ -130,9 +116,8 @@ def test_contacts_of_a_fine_take_the_stokes_number_of_the_fluid():
     assert scales.contacts["grain-grain"].stokes is None
     assert scales.contacts["grain-grain"].damping_ratio == 0.2
     rows = {row.name: row.value for row in scale_rows(case, scales)}
-    assert (
-        rows["grain-fine restitution in the liquid"] == scales.contacts["grain-fine"].restitution
-    )
+    restitution = scales.contacts["grain-fine"].restitution
+    assert rows["grain-fine restitution in the liquid"] == restitution
     assert rows["fine-wall impact Stokes number"] == scales.contacts["fine-wall"].stokes
     assert "grain-grain impact Stokes number" not in rows
     slow = scales_of(tiny(WET, "fluid.velocity_m_s=1e-3")).contacts["grain-fine"]
@@ -149,19 +134,14 @@ def test_cohesion_that_draws_fines_into_grains_warns_and_is_refused():
     joint = 1 / (1 / 5e-5 + 1 / 2.5e-4)
     at_limit = 1e-4 / joint * (modulus / math.pi) ** 2 / 2.25
     for share, warned in ((0.049, False), (0.051, True)):
-        cohesion = math.sqrt(share * at_limit)
-        text = " ".join(
-            scales_of(
-                tiny(HERTZ, f"contact.cohesion_J_m3={cohesion!r}", "fluid.velocity_m_s=1.0")
-            ).warnings
-        )
-        assert ("cohesion draws a fine" in text) is warned
+        cohesion = f"contact.cohesion_J_m3={math.sqrt(share * at_limit)!r}"
+        said = scales_of(tiny(HERTZ, cohesion, "fluid.velocity_m_s=1.0")).warnings
+        assert ("cohesion draws a fine" in " ".join(said)) is warned
     with pytest.raises(CaseError, match="draws a fine 51 % of its diameter into a grain"):
         scales_of(tiny(HERTZ, f"contact.cohesion_J_m3={math.sqrt(0.51 * at_limit)!r}"))
     rows = {row.name: row.value for row in scale_rows(case, scales_of(case))}
-    assert rows["pull-off force of a fine from a grain"] == pytest.approx(
-        2 / 3 * (math.pi * 1e7) ** 3 * joint**2 / modulus**2, rel=1e-12
-    )
+    force = 2 / 3 * (math.pi * 1e7) ** 3 * joint**2 / modulus**2
+    assert rows["pull-off force of a fine from a grain"] == pytest.approx(force, rel=1e-12)
 
 
 # ---- Fines that lock between two grains.
@@ -193,25 +173,18 @@ def thrown_back(slope, friction, ratio):
 def test_springs_lock_above_a_shear_ratio_of_friction_times_slope():
     """A second way: the way out of the groove, step by step."""
     for slope in [0.1, 0.32, 0.45]:
-        with naming(slope):
-            for friction in (0.5, 0.8):
-                limit = friction * slope
-                assert thrown_back(slope, friction, 1.05 * limit) > 0
-                assert thrown_back(slope, friction, 0.95 * limit) == 0.0
-                fine = f"fines.radius_mm={0.25 * (math.hypot(1, slope) - 1)}"
-                for factor in (0.95, 1.05):
-                    shear = [
-                        f"{part}.shear_stiffness_N_m={factor * limit * normal!r}"
-                        for part, normal in (("grains", 94.3e9), ("fines", 63e9))
-                    ]
-                    case = tiny(
-                        fine,
-                        f"fines.friction={friction}",
-                        f"grains.friction={friction}",
-                        "fines.count=3000",
-                        *shear,
-                    )
-                    assert scales_of(case).sticking.by_springs == (factor > 1)
+        fine = f"fines.radius_mm={0.25 * (math.hypot(1, slope) - 1)}"
+        for friction in (0.5, 0.8):
+            limit = friction * slope
+            assert thrown_back(slope, friction, 1.05 * limit) > 0, (slope, friction)
+            assert thrown_back(slope, friction, 0.95 * limit) == 0.0, (slope, friction)
+            for factor in (0.95, 1.05):
+                keys = [fine, "fines.count=3000"]
+                for part, normal in (("grains", 94.3e9), ("fines", 63e9)):
+                    keys += [f"{part}.friction={friction}"]
+                    keys += [f"{part}.shear_stiffness_N_m={factor * limit * normal!r}"]
+                locks = scales_of(tiny(*keys)).sticking.by_springs
+                assert locks == (factor > 1), (slope, friction, factor)
 
 
 def test_a_weak_push_on_stiff_springs_warns_of_the_integrator_and_its_remedies_hold():
@@ -219,10 +192,8 @@ def test_a_weak_push_on_stiff_springs_warns_of_the_integrator_and_its_remedies_h
     (text,) = locking(*weak)
     sticking = scales_of(tiny(*weak)).sticking
     assert sticking.false_force > 0.5
-    parsed = re.search(
-        r"divide run.time_step_factor by (\S+), or run.stiffness_N_m by (\S+) ", text
-    )
-    step, stiffness = (float(one) for one in parsed.groups())
+    said = r"divide run.time_step_factor by (\S+), or run.stiffness_N_m by (\S+) "
+    step, stiffness = map(float, re.search(said, text).groups())
     assert locking(*weak, f"run.time_step_factor={0.1 / (0.9 * step)!r}")
     assert not locking(*weak, f"run.time_step_factor={0.1 / (1.1 * step)!r}")
     assert locking(*weak, f"run.stiffness_N_m={1e4 / (0.9 * stiffness)!r}")

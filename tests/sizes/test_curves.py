@@ -7,28 +7,10 @@ import pytest
 from builders import tiny
 from scipy.special import gamma, gammaincinv, ndtr
 
+from fdnet import sizes
 from fdnet.errors import CaseError
-from fdnet.scales.pack import (
-    EQUAL_SPHERES,
-    close_packing,
-    densest_porosity,
-    refuse_unreachable,
-    within_limit,
-)
-from fdnet.sizes import (
-    NUMBER,
-    SURFACE,
-    VOLUME,
-    LogNormal,
-    Points,
-    RosinRammler,
-    SizeCurve,
-    Uniform,
-    best_fit,
-    cut_curve,
-    dealt,
-    volume_quantiles,
-)
+from fdnet.scales import pack
+from fdnet.sizes import NUMBER, LogNormal, RosinRammler, SizeCurve, Uniform, best_fit, cut_curve
 
 Z10 = 1.2815515655446004
 """Normal quantile of 90 %."""
@@ -36,7 +18,7 @@ Z10 = 1.2815515655446004
 
 def test_a_log_normal_curve_converts_as_hatch_and_choate_say():
     """ln D50 by weight w is ln D50 by number + w s^2; <d^k> = exp(k ln D50 + k^2 s^2 / 2)."""
-    weights = (NUMBER, SURFACE, VOLUME)
+    weights = (NUMBER, sizes.SURFACE, sizes.VOLUME)
     for spread, by in ((spread, by) for spread in (0.1, 0.54, 1.0) for by in weights):
         law, reach = LogNormal(40e-6, spread), math.exp(13 * spread)
         whole = SizeCurve(law=law, by=by, low=40e-6 / reach, high=40e-6 * reach)
@@ -92,7 +74,7 @@ def test_moments_of_rosin_and_rammler_are_gamma_functions():
 def test_measured_points_and_uniform_ranges_have_elementary_moments():
     """Between two sieves dF / d ln d is constant; <r^3> = (a + b)(a^2 + b^2) / 4 by number."""
     size, finer = (1e-4, 2e-4, 5e-4), (0.1, 0.6, 1.0)
-    curve = cut_curve(Points(size, finer))
+    curve = cut_curve(sizes.Points(size, finer))
     assert curve.below == pytest.approx(0.1)
     for power in (-3, -1, 2):
         exact = sum(
@@ -120,10 +102,10 @@ def test_strata_and_batches_have_the_curve_of_the_whole():
         assert curve.low <= placed.min() <= placed.max() <= curve.high
     shares = (0.1, 0.5, 0.9)
     wanted = [curve.size_at(share) for share in shares]
-    assert list(volume_quantiles(placed, shares)) == pytest.approx(wanted, rel=1e-3)
+    assert list(sizes.volume_quantiles(placed, shares)) == pytest.approx(wanted, rel=1e-3)
     # each batch of n takes one fine of each n-th part: a count is within 1.5 of its share
     counts = [50] * 19 + [31]
-    batches = dealt(counts, np.random.default_rng(1))
+    batches = sizes.dealt(counts, np.random.default_rng(1))
     assert sorted(np.concatenate(batches)) == list(range(sum(counts)))
     for count, batch in zip(counts, batches, strict=True):
         assert len(batch) == count
@@ -152,25 +134,25 @@ def test_three_points_of_a_law_are_met_and_others_by_the_line_of_least_squares()
 def test_spheres_fill_what_farr_and_groot_calibrated_on_and_farrs_formula_says():
     """R. S. Farr, Powder Technol. 245 (2013) 28, by number, within 0.0003 as he states."""
     one = SizeCurve(law=Uniform(1.0, 1.0), by=NUMBER, low=1.0, high=1.0)
-    assert close_packing(one) == pytest.approx(EQUAL_SPHERES, abs=3e-4)
-    assert densest_porosity(tiny().grains) == pytest.approx(1 - EQUAL_SPHERES, abs=3e-4)
+    assert pack.close_packing(one) == pytest.approx(pack.EQUAL_SPHERES, abs=3e-4)
+    assert pack.densest_porosity(tiny().grains) == pytest.approx(1 - pack.EQUAL_SPHERES, abs=3e-4)
     for spread in (0.1, 0.34, 0.6, 1.0):
         ends = {"low": math.exp(-8 * spread), "high": math.exp(8 * spread)}
         whole = SizeCurve(law=LogNormal(1.0, spread), by=NUMBER, **ends)
         ripple = math.cos(2 * math.pi * (1 - math.exp(-0.75 * spread**0.7 - 0.025 * spread**4)))
         formula = 1 - 0.57 * math.exp(-spread) + 0.2135 * math.exp(-0.57 * spread / 0.2135)
         formula += 0.0019 * (ripple - 1)
-        assert close_packing(whole) == pytest.approx(formula, abs=5e-4), spread
+        assert pack.close_packing(whole) == pytest.approx(formula, abs=5e-4), spread
 
 
 def test_a_porosity_out_of_reach_is_refused_with_what_can_be():
     """Spheres grown by 4 % with overlaps of 8 % allow 2 % growth at a limit of 4 %."""
     keys = "grains={{radius_mm=0.25, porosity={}, max_overlap={}}}"
-    least = 1 - EQUAL_SPHERES / 0.95**3
+    least = 1 - pack.EQUAL_SPHERES / 0.95**3
     with pytest.raises(CaseError, match=rf"below {least:.3f} .* ask for 0\.35\d or more"):
-        refuse_unreachable(tiny(keys.format(0.20, 0.05)))
-    refuse_unreachable(tiny(keys.format(0.26, 0.05)))
-    refuse_unreachable(tiny(keys.format(0.40, 0.001)))
+        pack.refuse_unreachable(tiny(keys.format(0.20, 0.05)))
+    pack.refuse_unreachable(tiny(keys.format(0.26, 0.05)))
+    pack.refuse_unreachable(tiny(keys.format(0.40, 0.001)))
     made = 1 - (1 - 0.36) * 1.04**3
-    assert within_limit(0.36, made, 0.08, 0.04) == pytest.approx(1 - (1 - 0.36) * 1.02**3)
-    assert within_limit(0.36, made, 0.08, 0.0) == pytest.approx(0.36)
+    assert pack.within_limit(0.36, made, 0.08, 0.04) == pytest.approx(1 - (1 - 0.36) * 1.02**3)
+    assert pack.within_limit(0.36, made, 0.08, 0.0) == pytest.approx(0.36)

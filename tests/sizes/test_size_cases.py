@@ -20,14 +20,10 @@ from fdnet.spheres.snapshot import Kind, resting
 
 SAND = {"D10": "0.25 mm", "D50": "0.40 mm", "D90": "0.60 mm"}
 MUD = {"D10": "20 um", "D50": "40 um", "D90": "80 um"}
+BARITE = {"D50": "30 um", "D90": "50 um"}
 MIXTURE = [
     {"name": "CaCO3", "density": "2.71 g/cc", "share": 3.0, "sizes": MUD},
-    {
-        "name": "barite",
-        "density": "4.2 g/cc",
-        "share": 1.0,
-        "sizes": {"D50": "30 um", "D90": "50 um"},
-    },
+    {"name": "barite", "density": "4.2 g/cc", "share": 1.0, "sizes": BARITE},
 ]
 
 
@@ -66,29 +62,25 @@ def test_sizes_are_diameters_and_their_moments_are_used():
 
 def test_a_bad_curve_gets_one_clear_problem():
     three = {"size_mm": [0.1, 0.2, 0.3]}
+    by_number = {"size_mm": [0.1, 0.2], "passing_percent": [5, 100], "by": "number"}
     for part, expected in [
         ({"D50": "40 um"}, "gives 1 of D10, D50 and D90"),
         ({"D10": "20 um", "size_mm": [0.1, 0.2], "passing_percent": [0, 100]}, "beside a meas"),
         (three | {"passing_percent": [0, 60, 50]}, "the curve must not fall"),
         (three | {"passing_percent": [0, 100]}, "3 sizes with 2 percentages"),
         (SAND | {"cut_percent": [0.0, 99.0]}, "has no ends"),
-        (
-            {"size_mm": [0.1, 0.2], "passing_percent": [5, 100], "by": "number"},
-            "spheres of unknown size have no volume",
-        ),
+        (by_number, "spheres of unknown size have no volume"),
         ({"D10": "20 psi", "D50": "40 um"}, "'psi' is a unit of pressure"),
         ({"file": "none.csv"}, "cannot be read as a table of sizes"),
     ]:
         assert expected in problem(measured(grains=part)), part
-    big = measured(
-        grains={"D10": "1.0 mm", "D90": "1.05 mm"}, fines={"D10": "0.6 mm", "D90": "0.65 mm"}
-    )
-    given = {"radius_mm": 0.02}
+    coarse, medium = {"D10": "1.0 mm", "D90": "1.05 mm"}, {"D10": "0.6 mm", "D90": "0.65 mm"}
+    big = measured(grains=coarse, fines=medium) | {"box": {"size_mm": [9.0] * 3}}
     for data, expected in [
         (measured(cut="150 um"), "leaves nothing of a curve that ends at 141 um"),
         (measured(fines={"D10": "0.1 mm", "D90": "1 mm"}), ", expected below grains.sizes"),
-        (big | {"box": {"size_mm": [9.0] * 3}}, "above every throat between touching grains"),
-        (measured(**given), "give exactly one of radius_mm, sizes and materials"),
+        (big, "above every throat between touching grains"),
+        (measured(radius_mm=0.02), "give exactly one of radius_mm, sizes and materials"),
         (measured(fines=None, materials=[MIXTURE[0]] * 2), "'CaCO3' is listed twice"),
     ]:
         assert expected in problem(data), expected
@@ -122,9 +114,7 @@ def test_materials_have_their_shares_of_mass_and_their_densities(tmp_path):
         assert rows[number] == pytest.approx([Kind.FINE, 2 * radius, own])
 
 
-# ------------------------------------------------------------------------------------------------
-# Tables of sizes.
-
+# ---- Tables of sizes.
 CURVE = ((0.075, 0), (0.15, 6), (0.3, 35), (0.6, 85), (1.18, 100))
 
 
@@ -144,20 +134,16 @@ def test_tables_of_instruments_and_sieves_are_read(tmp_path):
         sizes, finer = read_size_file(tmp_path, "s.csv")
         assert sizes == pytest.approx([size for size, _ in CURVE]), header
         assert finer == pytest.approx([share for _, share in CURVE]), header
-    (tmp_path / "sand.csv").write_text(  # retained is turned round
-        "# made by hand\nSieve (µm);Cumulative % retained\n"
-        "850;0\n600;10,5\n425;44\n212;97\n180;100\n"
-    )
-    path = tmp_path / "case.toml"
-    path.write_text(
-        'name = "sand"\n[box]\nsize_mm = [4.0, 2.4, 2.4]\n'
-        '[grains]\nporosity = 0.4\nsizes = { file = "sand.csv" }\n'
-    )
+    sand, path = tmp_path / "sand.csv", tmp_path / "case.toml"
+    head = "# made by hand\nSieve (µm);Cumulative % retained\n"  # turned round
+    sand.write_text(head + "850;0\n600;10,5\n425;44\n212;97\n180;100\n")
+    text = 'name = "sand"\nbox.size_mm = [4.0, 2.4, 2.4]\n'
+    path.write_text(text + 'grains = { porosity = 0.4, sizes = { file = "sand.csv" } }\n')
     case = read_case(path)
     assert case.grains.sizes.size_mm == pytest.approx((0.18, 0.212, 0.425, 0.6, 0.85))
     assert case.grains.sizes.passing_percent == pytest.approx((0, 3, 56, 89.5, 100))
     path.write_text(case.toml())
-    (tmp_path / "sand.csv").unlink()
+    sand.unlink()
     assert read_case(path) == case
 
 
@@ -178,23 +164,18 @@ def test_a_table_that_may_mean_several_things_is_refused():
             parse_sizes(text)
 
 
-# ------------------------------------------------------------------------------------------------
-# A run through the real binary.
-
+# ---- A run through the real binary.
+CALCITE, HEAVIER = (
+    {"D10": "25 um", "D50": "50 um", "D90": "90 um"},
+    {"D10": "40 um", "D90": "80 um"},
+)
+SOLIDS = {"cut": "50 um", "solids": "60 lb/bbl", "slab": "0.25 mm", "supply": "batches"}
 RUN = {
     "name": "measured",
     "box": {"size": ["1.9 mm", "1.8 mm", "1.8 mm"], "sides": "periodic"},
     "grains": {"sizes": SAND, "porosity": "38 %"},
-    "fines": {
-        "materials": [
-            MIXTURE[0] | {"sizes": {"D10": "25 um", "D50": "50 um", "D90": "90 um"}},
-            MIXTURE[1] | {"sizes": {"D10": "40 um", "D90": "80 um"}},
-        ],
-        "cut": "50 um",
-        "solids": "60 lb/bbl",
-        "slab": "0.25 mm",
-        "supply": "batches",
-    },
+    "fines": SOLIDS
+    | {"materials": [MIXTURE[0] | {"sizes": CALCITE}, MIXTURE[1] | {"sizes": HEAVIER}]},
     "fluid": {"viscosity": "10 cP", "velocity_m_s": 0.6},
     "run": {"stiffness": "100 N/m", "duration": "0.6 ms"},
     "analysis": {"sections": 2},

@@ -8,18 +8,12 @@ from fdnet.spheres.snapshot import Array
 
 
 def direct_tensor(shape: tuple[int, ...], walls: list[tuple[Array, Array]]) -> Array:
-    """K (3, 3), squared spacings, from velocities and pressures on the whole grid.
-
-    `walls` has the flat nodes (M,) and their slacks (M,) for each velocity component. There is no
-    iteration.
-    """
+    """K (3, 3), squared spacings; `walls`: flat nodes (M,), slacks (M,) of each component."""
     size = int(np.prod(shape))
     index = np.arange(size).reshape(shape)
+    ahead = [np.roll(index, -1, axis=d).ravel() for d in range(3)]
     shift = [
-        sparse.csr_matrix(
-            (np.ones(size), (index.ravel(), np.roll(index, -1, axis=d).ravel())), (size, size)
-        )
-        for d in range(3)
+        sparse.csr_matrix((np.ones(size), (index.ravel(), one)), (size, size)) for one in ahead
     ]
     one = sparse.identity(size)
     laplace = sum(2.0 * one - s - s.T for s in shift)

@@ -8,24 +8,16 @@ from direct_stokes import direct_tensor
 
 from fdnet.errors import CaseError, FlowError
 from fdnet.network import stokes
-from fdnet.network.stokes import (
-    OPEN,
-    Lattice,
-    divide,
-    extrapolate,
-    find_walls,
-    solve_slab,
-    solve_stokes,
-)
+from fdnet.network.stokes import extrapolate, find_walls, solve_slab, solve_stokes
 from fdnet.spheres.snapshot import resting
 
 SC, BCC = [[0.31, 0.17, 0.43]], [[0.1, 0.2, 0.3], [0.6, 0.7, 0.8]]
 FCC = [[0.1, 0.2, 0.3], [0.1, 0.7, 0.8], [0.6, 0.2, 0.8], [0.6, 0.7, 0.3]]
-HALF = Lattice(
+HALF = stokes.Lattice(
     low=np.zeros(3),
     spacing=np.ones(3),
     shape=(7, 8, 9),
-    walled=OPEN,
+    walled=stokes.OPEN,
     specimen=(0.0, 7.0),
     repeats=True,
     planes=True,
@@ -78,7 +70,7 @@ def test_a_direct_solve_gives_the_same_tensor():
     rng = np.random.default_rng(5)
     edges = np.array([1.0, 0.8, 0.9])
     pack = cell(rng.random((4, 3)) * edges, [0.2, 0.25, 0.3, 0.15], edges)
-    shape = divide(edges, 10)
+    shape = stokes.divide(edges, 10)
     grid = replace(HALF, spacing=edges / shape, shape=shape, specimen=(0.0, 1.0), planes=False)
     walls = [find_walls(grid, d, pack.position, pack.radius) for d in range(3)]
     tensor = direct_tensor(shape, [(wall.node, wall.slack) for wall in walls]) * grid.unit**2

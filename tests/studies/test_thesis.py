@@ -88,9 +88,8 @@ def test_fines_are_counted_by_depth(run):
     assert (row["supplied_count"], row["invaded_count"], row["count_first_mm"]) == (8, 7, 6)
     assert row["mean_depth_mm"] == pytest.approx((6 * 0.6 + 0.11 + 1.6) / 7)
     assert (row["fraction_first_0p25mm"], row["fraction_beyond_0p5mm"]) == (0, 1)
-    filled = (
-        BALL * 0.05**3 + 2 * BALL * THIN**3 + BALL * WIDE**3
-    )  # three almost at one place count once
+    # three almost at one place count once
+    filled = BALL * (0.05**3 + 2 * THIN**3 + WIDE**3)
     assert row["porosity_loss_first_mm"] == pytest.approx(filled / 4.4, rel=0.02)
 
 
