@@ -1,4 +1,8 @@
-"""A core and a well by the model, from what a specimen hands up, with bands."""
+"""A core and a well by the model, from what a specimen hands up, with bands.
+
+Both give numbers in SI by name, with the ends of their 95 % bands as `_low` and `_high`, rows by
+place, what was `handed_up`, `warnings`, and the answer in `words`.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -47,7 +51,7 @@ def core_flood(
     minutes: float = 30.0,
     back_flow: float = 10.0,
     sections: int = 4,
-    **cake: Any,
+    api_filtrate: float | None = None,
 ) -> dict[str, Any]:
     """A core of the specimen's sand flooded with its mud; then the flow is turned back.
 
@@ -58,12 +62,7 @@ def core_flood(
         minutes: of the flood.
         back_flow: pore volumes that flow back, where the run had a clean-up.
         sections: equal ones, between pressure taps.
-        cake: `cake_permeability` m2, or `api_filtrate` m3 that it follows from.
-
-    Returns:
-        Numbers in SI, with their 95 % bands as `_low` and `_high`: `k_over_k0`, `filtrate_m3`,
-        `effluent_over_c0`, `return_k_over_k0` (after a clean-up) and others; `sections`,
-        `handed_up`, `warnings`, and `words`.
+        api_filtrate: m3 in the API's test, which the permeability of the cake follows from.
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
@@ -85,8 +84,8 @@ def core_flood(
             flow = abs(float(made.rate[0]))
             seconds = back_flow * medium.porosity * area * length / flow
             forth, back = drive._replace(seconds=made.time[-1]), Flood(seconds, rate=-flow)
-            after = march(column, medium, [forth, back], taps=taps).k_over_k0[-1]
-            kept["return_k_over_k0"] = after
+            after = march(column, medium, [forth, back], taps=taps)
+            kept["return_k_over_k0"] = after.k_over_k0[-1]
         drops = np.cumsum(made.parts[-1, ::-1])[::-1]
         table = {"x_lo_m": taps[:-1], "x_hi_m": taps[1:], "pressure_Pa": drops[1:-1], **kept}
         return {
@@ -95,11 +94,10 @@ def core_flood(
             "rate_m3_s": float(made.rate[-1]),
             "pressure_Pa": float(drops[0]),
             "effluent_over_c0": float(made.effluent[-1].sum() / medium.solids),
-            "pressure_cake_Pa": float(made.parts[-1, 0]),
             "sections": pd.DataFrame(table).to_dict("records"),
         }
 
-    found = _banded(source, flooded, **cake)
+    found = _banded(source, flooded, api_filtrate)
     face = found["sections"][0]
     words = [
         f"A core of {1e3 * length:g} mm keeps {with_band(found, 'k_over_k0')} of its k0.",
@@ -120,9 +118,12 @@ def well_invasion(
     height: float = 1.0,
     pressure: float | None = None,
     radius: float | None = None,
-    **cake: Any,
+    api_filtrate: float | None = None,
 ) -> dict[str, Any]:
     """A well drilled through the specimen's sand with its mud, open hole and perforated.
+
+    The skin of the damage is integrated over the depth (`skin`) and by Hawkins; the lost flow is
+    the share of the productivity; the skin of the cake counts while the cake stands.
 
     Args:
         source: a run, its folder, or the folder of an ensemble.
@@ -130,12 +131,7 @@ def well_invasion(
         height: m, of the well.
         pressure: Pa, overbalance; without it that of the case.
         radius: m, of the well; without it that of the case, or 108 mm.
-        cake: as of `core_flood`.
-
-    Returns:
-        As `core_flood`: `filtrate_m3`, `invasion_radius_m`, `skin` of the damage (integrated) and
-        `skin_hawkins`, `flow_lost` (share of the productivity), `skin_cake` while the cake
-        stands, the same `perforated`, and `k_over_k0` by depth.
+        api_filtrate: as of `core_flood`.
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
@@ -167,7 +163,6 @@ def well_invasion(
             thin = cake_skin("inward", found["cake_thickness_m"], well)
             found["skin_cake"] = thin * medium.permeability / medium.cake_permeability
         left = np.interp(DEPTHS, (hole.edges[:-1] + hole.edges[1:]) / 2, 1 / loss, right=1.0)
-        table = pd.DataFrame({"depth_m": DEPTHS, "k_over_k0": left})
         return {
             **found,
             "invasion_radius_m": math.sqrt(well**2 + filtrate / pores),
@@ -176,10 +171,10 @@ def well_invasion(
             "damaged_depth_m": depth,
             "flow_lost": lost[0],
             "perforated": {"skin": skins[1], "flow_lost": lost[1]},
-            "k_over_k0": table.to_dict("records"),
+            "k_over_k0": pd.DataFrame({"depth_m": DEPTHS, "k_over_k0": left}).to_dict("records"),
         }
 
-    found = _banded(source, drilled, shape="inward", **cake)
+    found = _banded(source, drilled, api_filtrate)
     shot = found["perforated"]
     words = [
         f"The damage is a skin of {with_band(found, 'skin')} and costs an open hole "
@@ -224,7 +219,7 @@ def _steepest(medium: Medium) -> float:
 _STOPPED = {
     "": "",
     "closed": "the numbers are those of the time when the face had the deposit of the run's end, "
-    "for no cake is known; give --cake-permeability or --api-filtrate",
+    "for no cake is known; give --api-filtrate",
     "full": "the cake of these fines alone fills the hole: the numbers are those of that time. "
     "A mud that has finer solids too holds back its filtrate; give --api-filtrate",
 }
@@ -237,37 +232,39 @@ def _common(medium: Medium, column: Column, made: March) -> dict[str, Any]:
         "closed_at_s": made.closed_at,
         "filtrate_m3": float(made.filtrate[-1]),
         "cake_thickness_m": float(thick),
-        "deposit_m3": float(made.end.deposit.sum(axis=0) @ column.volume),
         "stopped": _STOPPED[made.stopped],
     }
+
+
+def _values(medium: Medium) -> dict[str, float | None]:
+    """The fitted numbers by name, SI; of several classes each with the name of its class."""
+    found = dict[str, float | None]()
+    for one in medium.mud:
+        end = f"_{one.name}" if len(medium.mud) > 1 else ""
+        found |= {f"rate_1_m{end}": one.rate, f"growth{end}": one.growth}
+    found |= {"closing_deposit": medium.closing, "damage": medium.damage}
+    return found | {"cake_permeability_m2": medium.cake_permeability}
 
 
 def _banded(
     source: str | Path | FinishedRun,
     by_model: Callable[[HandedUp], dict[str, Any]],
-    *,
-    shape: str = "linear",
-    cake_permeability: float | None = None,
-    api_filtrate: float | None = None,
+    api_filtrate: float | None,
 ) -> dict[str, Any]:
     """What the model gives for all that is handed up, with bands: of seeds, or of the fits."""
-    _above_zero(cake_permeability=cake_permeability, api_filtrate=api_filtrate)
-    many = []
-    for one in hand_up(source):
-        medium, known = one.medium, cake_permeability or one.medium.cake_permeability
-        if api_filtrate and not cake_permeability:
-            known = api_permeability(
-                api_filtrate,
-                viscosity=medium.viscosity,
-                solids=medium.solids,
-                porosity=medium.cake_porosity,
-            )
-        cake = replace(medium, cake_permeability=known, cake_shape=shape)
-        many.append(one._replace(medium=cake))
+    _above_zero(api_filtrate=api_filtrate)
+    many = [one._replace(medium=_caked(one.medium, api_filtrate)) for one in hand_up(source)]
     seeds = len({one.run.path for one in many})
-    found = _merged([by_model(one) | {"handed_up": one.values()} for one in many], seeds)
+    found = _merged([by_model(one) | {"handed_up": _values(one.medium)} for one in many], seeds)
     notes = [note for one in many for note in one.notes] + [found.pop("stopped")]
     return found | {"seeds": seeds, "warnings": [note for note in dict.fromkeys(notes) if note]}
+
+
+def _caked(mud: Medium, api_filtrate: float | None) -> Medium:
+    if api_filtrate is None:
+        return mud
+    given = {"viscosity": mud.viscosity, "solids": mud.solids, "porosity": mud.cake_porosity}
+    return replace(mud, cake_permeability=api_permeability(api_filtrate, **given))
 
 
 def _merged(trees: Sequence[Any], seeds: int) -> Any:
