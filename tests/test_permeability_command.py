@@ -224,10 +224,7 @@ CUBE = (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1) / 3**0.5
 
 @pytest.mark.parametrize(
     ("parts", "radii"),
-    [
-        (np.vstack([[0, 0, 0], 0.8 * CORNERS]), [1, 0.3, 0.3, 0.3, 0.3]),
-        (0.52 * CUBE, [0.72] * 8),
-    ],
+    [(np.vstack([[0, 0, 0], 0.8 * CORNERS]), [1, 0.3, 0.3, 0.3, 0.3]), (0.52 * CUBE, [0.72] * 8)],
     ids=["bumps", "eight"],
 )
 def test_clumps_are_right_against_resolved_flow(parts, radii):

@@ -316,9 +316,7 @@ class Run(Part):
     max_hours: Positive = 24.0
     """A case that is expected to run longer is refused."""
     max_overlap: Fraction = 0.05
-    """Overlap of a fine, over the smaller diameter, above which `on_overlap` applies."""
-    on_overlap: Literal["warn", "stop"] = "warn"
-    """Then the run warns, or stops with its state kept ("stop")."""
+    """Overlap of a fine, over the smaller diameter, above which the run warns."""
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] | None = None
     """Time step over sqrt(m/k) of the lightest sphere and stiffest contact; above 0.2 for linear
     contacts without rolling friction and with damping ratios up to 0.48 alone. When absent: 0.2;

@@ -63,11 +63,7 @@ FOLLOWED = ('drag={field = "network"}', "fines.supply=slab", "fines.count=100")
 def test_stiffness_auto_is_the_least_that_keeps_overlaps_small():
     for model in ["hooke", "hertz"]:
         with naming(model):
-            keys = (
-                *FOLLOWED,
-                f"contact.model={model}",
-                "fluid.velocity_m_s=5",
-            )
+            keys = (*FOLLOWED, f"contact.model={model}", "fluid.velocity_m_s=5")
             auto = scales_of(tiny(*keys, "run.stiffness_N_m=auto"))
             deepest = [auto.impact_overlap, auto.drag_overlap, auto.deposit_overlap]
             assert max(deepest) == pytest.approx(0.03, rel=0.1)
