@@ -15,17 +15,8 @@ import pandas as pd
 
 from fdnet.errors import CaseError
 from fdnet.files import write_text
+from fdnet.formation import model
 from fdnet.formation.handed_up import HandedUp, draw_fit, hand_up
-from fdnet.formation.model import (
-    Column,
-    Flood,
-    March,
-    Medium,
-    cake_skin,
-    damage_skin,
-    march,
-    steep_grid,
-)
 from fdnet.report.html import FORMATION, formation_html, put_section
 from fdnet.report.tables import plain_json
 from fdnet.run.answer import DAMAGED_FROM, flow_lost, hawkins
@@ -72,19 +63,19 @@ def core_flood(
     _above_zero(length=length, diameter=diameter, minutes=minutes, sections=sections)
     _above_zero(rate=rate, pressure=pressure, back_flow=back_flow)
     area, taps = math.pi * diameter**2 / 4, np.linspace(0.0, length, sections + 1)
-    drive = Flood(60 * minutes, pressure or math.nan, rate)
+    drive = model.Flood(60 * minutes, pressure or math.nan, rate)
 
     def flooded(handed: HandedUp) -> dict[str, Any]:
         medium = handed.medium
         scale = 1 / (_steepest(medium) + 1 / length)
-        column = Column(edges=steep_grid(length, CELLS, scale), area=area)
-        made = march(column, medium, [drive], taps=taps)
+        column = model.Column(edges=model.steep_grid(length, CELLS, scale), area=area)
+        made = model.march(column, medium, [drive], taps=taps)
         kept = {"k_over_k0": made.k_over_k0[-1]}
         if medium.released:
             flow = abs(float(made.rate[0]))
             seconds = back_flow * medium.porosity * area * length / flow
-            forth, back = drive._replace(seconds=made.time[-1]), Flood(seconds, rate=-flow)
-            after = march(column, medium, [forth, back], taps=taps)
+            forth, back = drive._replace(seconds=made.time[-1]), model.Flood(seconds, rate=-flow)
+            after = model.march(column, medium, [forth, back], taps=taps)
             kept["return_k_over_k0"] = after.k_over_k0[-1]
         drops = np.cumsum(made.parts[-1, ::-1])[::-1]
         table = {"x_lo_m": taps[:-1], "x_hi_m": taps[1:], "pressure_Pa": drops[1:-1], **kept}
@@ -149,10 +140,10 @@ def well_invasion(
             raise CaseError(f"radius: {well:g} m, expected below the drainage radius, {outer:g} m")
         if not over:
             raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
-        drive, shots = Flood(3600 * hours, over), SHOTS * SHOT_LENGTH
+        drive, shots = model.Flood(3600 * hours, over), SHOTS * SHOT_LENGTH
         hole, made, loss = _around(medium, well, height, outer, drive)
         shot, _, of_shot = _around(medium, SHOT_RADIUS, height * shots, outer, drive)
-        skins = damage_skin(hole, loss), damage_skin(shot, of_shot) / shots
+        skins = model.damage_skin(hole, loss), model.damage_skin(shot, of_shot) / shots
         lost = [flow_lost(skin, well=well, drainage=outer) for skin in skins]
         zone = int(np.max(np.flatnonzero(1 / loss <= 1 - DAMAGED_FROM) + 1, initial=0))
         rings, depth = np.diff(hole.reach(hole.edges))[:zone], float(hole.edges[zone])
@@ -160,7 +151,7 @@ def well_invasion(
         found = _common(medium, hole, made)
         pores, filtrate = math.pi * medium.porosity * height, found["filtrate_m3"]
         if medium.cake_permeability:
-            thin = cake_skin("inward", found["cake_thickness_m"], well)
+            thin = model.cake_skin("inward", found["cake_thickness_m"], well)
             found["skin_cake"] = thin * medium.permeability / medium.cake_permeability
         left = np.interp(DEPTHS, (hole.edges[:-1] + hole.edges[1:]) / 2, 1 / loss, right=1.0)
         return {
@@ -200,18 +191,18 @@ def keep(folder: Path, name: str, found: Mapping[str, Any], given: Mapping[str, 
 
 
 def _around(
-    medium: Medium, well: float, height: float, outer: float, drive: Flood
-) -> tuple[Column, March, np.ndarray]:
+    medium: model.Medium, well: float, height: float, outer: float, drive: model.Flood
+) -> tuple[model.Column, model.March, np.ndarray]:
     """The rock around a hole of radius `well` m as deep as fines get, its mud, and k0 / k (J,)."""
     slowest = min((one.rate for one in medium.mud if one.rate > 0), default=1.0)
-    edges = steep_grid(min(outer - well, 20 / slowest), CELLS, 1 / (_steepest(medium) + 1))
+    edges = model.steep_grid(min(outer - well, 20 / slowest), CELLS, 1 / (_steepest(medium) + 1))
     area = 2 * math.pi * well * height
-    column = Column(edges=edges, area=area, well=well, outer=outer - well)
-    made = march(column, medium, [drive])
+    column = model.Column(edges=edges, area=area, well=well, outer=outer - well)
+    made = model.march(column, medium, [drive])
     return column, made, medium.loss(made.end.deposit.sum(axis=0))
 
 
-def _steepest(medium: Medium) -> float:
+def _steepest(medium: model.Medium) -> float:
     """Rate of filtration at the face when it closes, 1/m."""
     return max(one.rate * (1 + max(one.growth, 0.0) * medium.closing) for one in medium.mud)
 
@@ -225,7 +216,7 @@ _STOPPED = {
 }
 
 
-def _common(medium: Medium, column: Column, made: March) -> dict[str, Any]:
+def _common(medium: model.Medium, column: model.Column, made: model.March) -> dict[str, Any]:
     thick = made.end.cake.sum() / ((1 - medium.cake_porosity) * column.area)
     return {
         "time_s": float(made.time[-1]),
@@ -236,7 +227,7 @@ def _common(medium: Medium, column: Column, made: March) -> dict[str, Any]:
     }
 
 
-def _values(medium: Medium) -> dict[str, float | None]:
+def _values(medium: model.Medium) -> dict[str, float | None]:
     """The fitted numbers by name, SI; of several classes each with the name of its class."""
     found = dict[str, float | None]()
     for one in medium.mud:
@@ -260,7 +251,7 @@ def _banded(
     return found | {"seeds": seeds, "warnings": [note for note in dict.fromkeys(notes) if note]}
 
 
-def _caked(mud: Medium, api_filtrate: float | None) -> Medium:
+def _caked(mud: model.Medium, api_filtrate: float | None) -> model.Medium:
     if api_filtrate is None:
         return mud
     given = {"viscosity": mud.viscosity, "solids": mud.solids, "porosity": mud.cake_porosity}
