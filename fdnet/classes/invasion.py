@@ -173,8 +173,26 @@ def invade_classes(
         if not course.at_rate:
             more = cake / course.resistance
             velocity = velocity_in(velocity, course.rest, state.k_over_k0, more)
-        rows.append(_row(course, sieve, solids, time, filtrate, velocity, state.k_over_k0, cake))
         by_class.append([solids.inside_by_class, solids.passed, solids.cake])
+        supplied = float(solids.supplied.sum())
+        viscosity, inside, passed, before = course.bed.viscosity, *np.sum(by_class[-1], axis=1)
+        drop = viscosity * velocity * course.resistance / max(state.k_over_k0, 1e-300)
+        rows.append(
+            {
+                "time_s": time,
+                "rate_m3_s": velocity * sieve.area,
+                "rate_over_initial": velocity / course.velocity,
+                "k_over_k0": state.k_over_k0,
+                "filtrate_m3": filtrate,
+                "supplied_m3": supplied,
+                "invaded_m3": float(inside),
+                "passed_m3": float(passed),
+                "cake_m3": float(before),
+                "cake_thickness_m": thickness_of_cake(sieve, solids),
+                "pressure_cake_Pa": viscosity * velocity * cake,
+                "pressure_pack_Pa": drop,
+            }
+        )
         reason = reason or ("plugged" if velocity <= 0 else "")
         if reason:
             break
@@ -182,25 +200,24 @@ def invade_classes(
         filtering = filter_coefficient(classes, bed, course.sticking)
         what = holding(sieve, solids, classes, state.streams, filtering)
         rate, bounds = velocity * sieve.area, []
-        bounds.append((course.supply - float(solids.supplied.sum())) / mud)
+        bounds.append((course.supply - supplied) / mud)
         bounds.append(((course.duration or course.cap_time) - time) * rate)
         if course.duration is None:
             bounds.append(0.25 * course.plug_time * rate)
         volume = min(wanted, *bounds)
-        drop = course.bed.viscosity * velocity * course.resistance / state.k_over_k0
         while True:
             loose = solids
             if course.release:
                 law, streams = course.release, state.streams
                 loose = released(sieve, solids, streams, drop, volume / rate, law)
-            _, after = advanced(sieve, loose, classes, state.streams, what, volume)
+            after = advanced(sieve, loose, classes, state.streams, what, volume)
             new = kept_shares(sieve, after, classes)
             change = _change(sieve, state.energy, kept, new)
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
                 break
             volume *= max(0.2, CHANGE / change)
         wanted = volume * min(max(CHANGE / max(change, 1e-9), 0.3), 2.0)
-        come = volume * float(np.sum(state.streams.fed[:, None] * classes.concentration))
+        come = volume * mud * float(state.streams.fed.sum())
         entered = come - float(np.sum(after.cake - solids.cake))
         time, filtrate = time + volume / rate, filtrate + volume
         crossing = entered / (mud * volume) * velocity / course.velocity
@@ -234,34 +251,6 @@ def _ended(course: Course, time: float, quiet: float, supplied: float) -> str:
     if supplied >= near * course.supply:
         return "supply_exhausted"
     return "cap" if time >= near * course.cap_time else ""
-
-
-def _row(
-    course: Course,
-    sieve: Sieve,
-    solids: Deposits,
-    time: float,
-    filtrate: float,
-    velocity: float,
-    k_over_k0: float,
-    cake: float,
-) -> dict[str, float]:
-    inside = float(solids.inside_by_class.sum())
-    viscosity = course.bed.viscosity
-    return {
-        "time_s": time,
-        "rate_m3_s": velocity * sieve.area,
-        "rate_over_initial": velocity / course.velocity,
-        "k_over_k0": k_over_k0,
-        "filtrate_m3": filtrate,
-        "supplied_m3": float(solids.supplied.sum()),
-        "invaded_m3": inside,
-        "passed_m3": float(solids.passed.sum()),
-        "cake_m3": float(solids.cake.sum()),
-        "cake_thickness_m": thickness_of_cake(sieve, solids),
-        "pressure_cake_Pa": viscosity * velocity * cake,
-        "pressure_pack_Pa": viscosity * velocity * course.resistance / max(k_over_k0, 1e-300),
-    }
 
 
 def cake_permeability(case: InvasionCase) -> float | None:

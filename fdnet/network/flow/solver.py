@@ -167,7 +167,10 @@ def multigrid(matrix: sparse.csr_matrix) -> Solve:
 
 
 def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
-    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner."""
+    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner.
+
+    That of pyamg itself takes norms beside, by BLAS on all cores, which nobody reads.
+    """
     hierarchy = pyamg.ruge_stuben_solver(
         matrix,
         strength=("classical", {"theta": STRENGTH}),
@@ -177,7 +180,16 @@ def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
         max_coarse=10,
         coarse_solver="splu",
     )
-    cycle: Callable[[Array], Array] = hierarchy.aspreconditioner(cycle="V").matvec
+
+    def cycle(source: Array, level: int = 0) -> Array:
+        here, solution = hierarchy.levels[level], np.zeros_like(source)
+        if level == len(hierarchy.levels) - 1:
+            return np.asarray(hierarchy.coarse_solver(here.A, source))
+        here.presmoother(here.A, solution, source)
+        solution += here.P @ cycle(here.R @ (source - here.A @ solution), level + 1)
+        here.postsmoother(here.A, solution, source)
+        return solution
+
     return cycle
 
 
