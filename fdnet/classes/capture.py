@@ -152,6 +152,6 @@ def covered(deposit: Array, classes: SizeClasses, surface: Array) -> Array:
 
     A fine covers its own section, 3 / (2 d) for each volume (Johnson and Elimelech 1995).
     """
-    section = deposit @ (1.5 / classes.diameter)
+    section = np.einsum("nc,c->n", deposit, 1.5 / classes.diameter)
     full = JAMMED * np.where(surface > 0, surface, math.inf)
     return np.minimum(section / full, 1.0)

@@ -159,7 +159,8 @@ def loads_of(
 
 def _sums(deposit: Array, classes: SizeClasses) -> Array:
     """Of solids (M, C) m3 the volume, and that of each class over its diameter, (M, 2)."""
-    return deposit @ np.column_stack([np.ones(len(classes.diameter)), 1.0 / classes.diameter])
+    parts = np.column_stack([np.ones(len(classes.diameter)), 1.0 / classes.diameter])
+    return np.einsum("mc,cp->mp", deposit, parts)  # not by BLAS, whose threads wait for each other
 
 
 def _gathered(where: Array, values: Array, count: int) -> Array:

@@ -50,17 +50,17 @@ class PackState(NamedTuple):
     flow: Flow
 
 
-def flows_through(network: Network, sieve: Sieve, clean: Array) -> "PackStateOf":
+def flows_through(network: Network, sieve: Sieve, clean: Array, intact: Flow) -> "PackStateOf":
     """How the fluid flows through a network when the sides of its throats keep some of `clean`.
 
-    `clean` (T,) m3 are the conductances without solids. Raises FlowError as `solve_flow` does.
+    `clean` (T,) m3 are the conductances without solids, `intact` is the flow by them. Raises FlowError as `solve_flow` does.
     """
     first = np.unique(network.pore_group, return_index=True)[1]
-    whole, intact = sieve.halves.sum(axis=1), solve_flow(network, clean).inflow
+    whole = sieve.halves.sum(axis=1)
 
-    def state(kept: Array) -> PackState:
+    def state(kept: Array, near: Flow | None) -> PackState:
         conductance = clean * ratio(whole, np.sum(sieve.halves / kept, axis=1))
-        flow = solve_flow(network, conductance)
+        flow = solve_flow(network, conductance, near=near or intact)
         streams = streams_of(
             sieve.ends,
             flow.throat_flux,
@@ -72,15 +72,16 @@ def flows_through(network: Network, sieve: Sieve, clean: Array) -> "PackStateOf"
         return PackState(
             streams=streams,
             energy=spent / max(float(spent.sum()), 1e-300),
-            k_over_k0=flow.inflow / intact if intact > 0 else 0.0,
+            k_over_k0=flow.inflow / intact.inflow if intact.inflow > 0 else 0.0,
             flow=flow,
         )
 
     return state
 
 
-PackStateOf = Callable[[Array], PackState]
-"""The flow, from the share (T, 2) of its conductance that each side of a throat keeps."""
+PackStateOf = Callable[[Array, Flow | None], PackState]
+"""The flow, from the share (T, 2) of its conductance that each side of a throat keeps, and a flow
+near it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,7 +167,7 @@ def invade_classes(
     solids, pores = no_solids(sieve, classes), float(sieve.void.sum())
     kept, rows, by_class, time, filtrate = np.ones(sieve.ends.shape), [], [], 0.0, 0.0
     wanted, quiet, reason, mud = FIRST_STEP * pores, 0.0, "", float(classes.concentration.sum())
-    state = flow_with(kept)
+    state = flow_with(kept, None)
     for _ in range(MOST_STEPS):
         cake = cake_resistance(course.cake_permeability, sieve, solids, classes)
         velocity = course.velocity
@@ -223,7 +224,7 @@ def invade_classes(
         crossing = entered / (mud * volume) * velocity / course.velocity
         quiet = quiet + volume / rate if crossing <= course.plug_rate else 0.0
         solids, kept = after, new
-        state = flow_with(kept)
+        state = flow_with(kept, state.flow)
         reason = _ended(course, time, quiet, float(solids.supplied.sum()))
     return ClassInvasion(
         solids=solids,

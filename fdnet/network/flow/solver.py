@@ -324,18 +324,23 @@ class Balance(NamedTuple):
     """(n,) over the unit of the jumps."""
     flux: Array
     """(K,) from the first to the second end, in units of conductance times jump."""
+    drop: Array
+    """(K,) of the pressure along the links, in units of the jumps."""
     defect: float
     """Sum of the imbalances of the nodes over the throughput; it bounds its relative error."""
     method: str
     """How the system was solved."""
 
 
-def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> Balance:
+def balance_links(
+    ends: Array, conductance: Array, jump: Array, count: int, *, near: Balance | None = None
+) -> Balance:
     """Balance of `count` nodes, every one of which must be in a group that winds.
 
     Links have the `ends` (K, 2), the `conductance` (K,) above 0 and the `jump` (K,). What the
     fluxes lack in balance is solved for again, until the defect is `SETTLED`. Fluxes add up by
     increments, never as differences of nearly equal pressures. The caller judges the defect.
+    The solve starts from `near`, the balance of the same links with other conductances.
     """
     conductance = held_conductance(ends, conductance, jump, count)
     free = np.ones(count, bool)
@@ -347,6 +352,9 @@ def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> B
     inner = np.all(free[ends], axis=1)
     balances = Balances(index[ends[inner]], conductance[inner], tied)
     pressure, flux, defect, allowed = np.zeros(count), conductance * jump, np.inf, None
+    if near is not None:
+        pressure, flux = near.pressure, conductance * near.drop
+        allowed = 0.3 * SETTLED * abs(float(flux @ jump))
     for _ in range(MOST_SWEEPS):
         step, before = np.zeros(count), defect
         step[free] = balances.solve(-_net(ends, flux, count)[free], imbalance=allowed)
@@ -357,7 +365,7 @@ def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> B
         allowed = 0.3 * SETTLED * abs(throughput)
         if defect <= SETTLED or not defect < 0.7 * before:
             break
-    return Balance(pressure, flux, defect, balances.method)
+    return Balance(pressure, flux, flux / conductance, defect, balances.method)
 
 
 def held_conductance(ends: Array, conductance: Array, jump: Array, count: int) -> Array:
