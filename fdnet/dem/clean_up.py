@@ -8,16 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fdnet.dem import deck
+from fdnet.dem import deck, invade_deck
 from fdnet.dem.checkpoint import HISTORY, Checkpoints, Cleaned, read_history, state_at
 from fdnet.dem.deck import BELOW_ZERO, Deck, number
-from fdnet.dem.invade_deck import (
-    DrivingFluid,
-    coupled_parts,
-    dump_variables,
-    moving_variables,
-    specimen_regions,
-)
 from fdnet.dem.invasion import ChunkedStage, EndedStage
 from fdnet.dem.liggghts import Launch
 from fdnet.errors import CaseError, Doubt, LiggghtsError
@@ -54,7 +47,7 @@ def render_clean_up(
     text = deck.render_text(
         "clean_up.in.j2",
         deck.header_variables(case, "invade", left_out, ranks)
-        | moving_variables(case, scales)
+        | invade_deck.moving_variables(case, scales)
         | {
             "stage": "clean_up",
             "digest": digest,
@@ -63,7 +56,7 @@ def render_clean_up(
             "gravity": gravity,
             "drag": turned_drag(flow),
             "resume": False,
-            "regions": specimen_regions(case)
+            "regions": invade_deck.specimen_regions(case)
             | {"out": f"INF {number(BELOW_ZERO)} INF INF INF INF"},
             "start": last._replace(chunk=last.chunk + 1) if last else Cleaned(1, *[0] * 5),
             "chunks": flow.chunks,
@@ -119,9 +112,11 @@ class CleanUpStage(ChunkedStage):
             restart, name = f"post/clean_{last.step}.restart", f"{name}.resume"
         made = render_clean_up(self.flow, start.digest, restart, last, ranks=self.launch.ranks)
         write_text(self.folder / name, made.text)
-        parts = coupled_parts(case, self.flow.scales)
+        parts = invade_deck.coupled_parts(case, self.flow.scales)
         if parts:
-            parts["checkpoint.in"] = deck.render_text("cleaned.in.j2", dump_variables(case))
+            parts["checkpoint.in"] = deck.render_text(
+                "cleaned.in.j2", invade_deck.dump_variables(case)
+            )
         for part, text in parts.items():
             write_text(self.folder / part, text)
         return made
@@ -157,7 +152,7 @@ def clean_up(
     folder: Path,
     launch: Launch,
     *,
-    fluid: DrivingFluid | None = None,
+    fluid: invade_deck.DrivingFluid | None = None,
 ) -> EndedStage:
     """Turn the flow back; continues from the last whole checkpoint when `folder` holds one.
 

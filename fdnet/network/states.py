@@ -21,16 +21,8 @@ from fdnet.errors import Doubt, FlowError, NetworkError
 from fdnet.names import ALL_SPHERES, AUTO, DEFAULT_LAW, MOST_SPHERES, SECTION_ARCHIE
 from fdnet.network.compiled import on_all_cores
 from fdnet.network.fines.occupancy import measure_occupancy
+from fdnet.network.flow import sections
 from fdnet.network.flow.flow import Flow
-from fdnet.network.flow.sections import (
-    Layers,
-    SlabK,
-    inplace_permeability,
-    layer_edges,
-    plane_pressures,
-    slab_permeability,
-    whole_permeability,
-)
 from fdnet.network.laws.damage import Damage, DamageLaw
 from fdnet.network.laws.deposit_resistances import deposit_resistances, grain_resistances
 from fdnet.network.laws.named import LAWS, damage_law
@@ -118,7 +110,7 @@ class Log:
         self.seconds[stage] += time.perf_counter() - start
 
 
-NO_SLABS = SlabK(cut_out=frozen([]), inplace=frozen([]), flows=())
+NO_SLABS = sections.SlabK(cut_out=frozen([]), inplace=frozen([]), flows=())
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -136,7 +128,7 @@ class State:
     halves: Array | None
     """(T, 2) 1/m3, resistances of the two halves of the throats, by which the pressure falls along
     them; None for laws that have none."""
-    slabs: SlabK = NO_SLABS
+    slabs: sections.SlabK = NO_SLABS
     """Permeability of the sections, cut out and in place; of none where nobody asked."""
     refused: tuple[str, ...] = ()
     """Sections whose spheres make no network of their own, one sentence each."""
@@ -147,7 +139,7 @@ class State:
 def make_state(network: Network, conductance: Array, halves: Array | None, log: Log) -> State:
     """The state of a network with this conductance (T,) m3, without its sections."""
     with log.timed("solve"):
-        k, flow = whole_permeability(network, conductance)
+        k, flow = sections.whole_permeability(network, conductance)
     return State(network=network, conductance=conductance, flow=flow, k=k, halves=halves)
 
 
@@ -171,8 +163,8 @@ def with_slabs(state: State, edges: Array, cut: Cut | None, conduct: Conduct, lo
     def one(slab: tuple[object, tuple[float, float]]) -> tuple[float, Flow]:
         alone, span = slab
         if isinstance(alone, Network):
-            return whole_permeability(alone, conduct(alone))
-        return slab_permeability(network, state.conductance, span)
+            return sections.whole_permeability(alone, conduct(alone))
+        return sections.slab_permeability(network, state.conductance, span)
 
     with log.timed("solve"):
         if len(spans) == 1 and not network.periodic[0]:  # one slab is the whole box
@@ -180,8 +172,8 @@ def with_slabs(state: State, edges: Array, cut: Cut | None, conduct: Conduct, lo
         else:
             networks: Sequence[object] = cut or [None] * len(spans)
             parts = on_all_cores(one, zip(networks, spans, strict=True))
-        inplace = inplace_permeability(network, state.flow, edges, state.halves)
-    slabs = SlabK(
+        inplace = sections.inplace_permeability(network, state.flow, edges, state.halves)
+    slabs = sections.SlabK(
         cut_out=frozen([k for k, _ in parts]),
         inplace=frozen(inplace),
         flows=tuple(flow for _, flow in parts),
@@ -232,7 +224,7 @@ permeability with fines is off by 5 % (rms), above which by 3 % (docs/evidence/a
 
 
 def at_most_the_grains(
-    whole: State, k_grains: float, grains: SlabK | None, edges: Array, empty: Array
+    whole: State, k_grains: float, grains: sections.SlabK | None, edges: Array, empty: Array
 ) -> tuple[State, dict[str, int]]:
     """The permeabilities with fines, at most those of the grains, and how many were above.
 
@@ -264,19 +256,23 @@ def at_most_the_grains(
     return replace(whole, k=min(k, k_grains), slabs=slabs), counts
 
 
-def make_layers(initial: State, damaged: State, thickness: float, depth: Array) -> Layers:
+def make_layers(initial: State, damaged: State, thickness: float, depth: Array) -> sections.Layers:
     """Layers of `thickness` m of a specimen before and after; `depth` (F,) m of its fines."""
-    edges = layer_edges(initial.network.box, thickness)
+    edges = sections.layer_edges(initial.network.box, thickness)
 
     def drop(state: State) -> Array:
         if not state.flow.inflow:
             return frozen(np.full(len(edges) - 1, np.nan))
-        return frozen(-np.diff(plane_pressures(state.network, state.flow, edges, state.halves)))
+        return frozen(
+            -np.diff(sections.plane_pressures(state.network, state.flow, edges, state.halves))
+        )
 
     def k(state: State) -> Array:
-        return frozen(inplace_permeability(state.network, state.flow, edges, state.halves))
+        return frozen(
+            sections.inplace_permeability(state.network, state.flow, edges, state.halves)
+        )
 
-    return Layers(
+    return sections.Layers(
         edges=frozen(edges),
         k_initial=k(initial),
         k_damaged=k(damaged),

@@ -21,6 +21,7 @@ from fdnet.names import AUTO, DEFAULT_LAW, LIGGGHTS_STAGES, STAGES, off_by_facto
 from fdnet.network.warm_up import compiling
 from fdnet.report import html, tables
 from fdnet.report.text import case_words, thesis_law_warning
+from fdnet.run import outputs
 from fdnet.run.by_classes import (
     analysed_classes,
     class_model,
@@ -40,14 +41,6 @@ from fdnet.run.folder import (
     digests_of_results,
     open_folder,
     read_manifest,
-)
-from fdnet.run.outputs import (
-    Results,
-    draw_figures,
-    placed_sizes,
-    with_added,
-    write_paraview,
-    write_tables,
 )
 from fdnet.run.records import RunOptions, Session, cores, finer_file, stage_costs
 from fdnet.run.stokes_sections import report_section
@@ -280,8 +273,8 @@ def _manifest(session: Session, records: Records, summary: Mapping[str, Any]) ->
 def _analyse_and_report(session: Session, records: Records) -> dict[str, Any]:
     """Tables and the summary, which is given out before figures and report are made of them."""
     with session.timed("analyse"):
-        results = with_added(_analysed(session, records), records.get("clean_up"))
-        write_tables(results)
+        results = outputs.with_added(_analysed(session, records), records.get("clean_up"))
+        outputs.write_tables(results)
     steps = {f"analyse_{name}": value for name, value in results.analysis.seconds.items()}
     summary = summarise(session, results, records)
     summary["seconds"] |= steps
@@ -289,8 +282,8 @@ def _analyse_and_report(session: Session, records: Records) -> dict[str, Any]:
     session.options.answered(summary)
     if "report" in session.options.stages:
         with session.timed("report"):
-            lacking = write_paraview(results)
-            figures, notes = draw_figures(results, solid=not lacking)
+            lacking = outputs.write_paraview(results)
+            figures, notes = outputs.draw_figures(results, solid=not lacking)
         summary["warnings"] += [explained(note) for note in lacking + notes]
         summary |= stage_costs(records, session)
         summary["seconds"] |= steps
@@ -299,7 +292,7 @@ def _analyse_and_report(session: Session, records: Records) -> dict[str, Any]:
     return summary
 
 
-def _analysed(session: Session, records: Records) -> Results:
+def _analysed(session: Session, records: Records) -> outputs.Results:
     """The specimen before, after the invasion if any, and after its clean-up if any."""
     case, grains, record = (
         session.case,
@@ -307,9 +300,9 @@ def _analysed(session: Session, records: Records) -> Results:
         records["invade"],
     )
     laws = partial(with_default_laws, periodic=case.periodic, options=case.analysis)
-    results = partial(Results, path=session.path, grains=grains)
+    results = partial(outputs.Results, path=session.path, grains=grains)
     if record is None or not isinstance(case, InvasionCase):
-        sizes = tuple(placed_sizes(case, grains, None, 0))
+        sizes = tuple(outputs.placed_sizes(case, grains, None, 0))
         return results(invasion=None, analysis=laws(grains, None), sizes=sizes)
     folder = session.path / "invade"
     if case.by_classes:
@@ -318,7 +311,7 @@ def _analysed(session: Session, records: Records) -> Results:
         return results(
             invasion=done,
             analysis=analysed_classes(model, kept, laws(grains, None), done.damaged),
-            sizes=tuple(placed_sizes(case, grains, None, 0)),
+            sizes=tuple(outputs.placed_sizes(case, grains, None, 0)),
             numbers=class_summary(case, model, kept),
         )
     done, after = invaded(session, case, grains, record), None
@@ -330,13 +323,13 @@ def _analysed(session: Session, records: Records) -> Results:
         options = case.analysis.changed(damage_law=analysis.damage_law_used)
         again = analyse(grains, state, periodic=case.periodic, options=options)
         after = compared(done.damaged, state, again)
-    sizes = tuple(placed_sizes(case, grains, done.damaged, record["supplied"]))
+    sizes = tuple(outputs.placed_sizes(case, grains, done.damaged, record["supplied"]))
     found = results(invasion=done, analysis=analysis, sizes=sizes, cleaned=after)
     finer = finer_file(record["steps"]) in record["files"]
     return with_finer(found, record["supplied"]) if finer else found
 
 
-def with_finer(results: Results, supplied: int) -> Results:
+def with_finer(results: outputs.Results, supplied: int) -> outputs.Results:
     """The results with the classes that are finer than the spheres, of which `supplied` came.
 
     Counts are of spheres and of rows of fines, each of which stands for a mean sphere's volume.
@@ -373,7 +366,10 @@ def with_default_laws(
 
 
 def _write_page(
-    session: Session, results: Results, summary: dict[str, Any], figures: list[tuple[Path, str]]
+    session: Session,
+    results: outputs.Results,
+    summary: dict[str, Any],
+    figures: list[tuple[Path, str]],
 ) -> None:
     case, command = session.case, session.options.command
     parts = html.ReportParts(

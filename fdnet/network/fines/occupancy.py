@@ -13,13 +13,7 @@ import numpy as np
 from fdnet.errors import CaseError, NetworkError
 from fdnet.network import geometry
 from fdnet.network.compiled import compiled
-from fdnet.network.fines.deposit import (
-    centred_inside,
-    deposit_in_pores,
-    images_near,
-    points_in_boxes,
-    reaching_inside,
-)
+from fdnet.network.fines import deposit
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line
 
@@ -253,8 +247,8 @@ def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exac
     number = np.bincount(throat, minlength=count)
     radii = np.bincount(throat, weights=pairs.sphere, minlength=count)
     porosity = 1.0 - ratio(filled, np.pi * network.throat_radius**2 * network.throat_length)
-    reaching = fines.where(reaching_inside(network, fines))
-    solid, surface = deposit_in_pores(network, reaching)
+    reaching = fines.where(deposit.reaching_inside(network, fines))
+    solid, surface = deposit.deposit_in_pores(network, reaching)
     values = {
         "throat_solid_volume": filled,
         "throat_porosity": porosity,
@@ -271,7 +265,7 @@ def measure_occupancy(network: Network, fines: Snapshot, *, overlap: str = "exac
         "pair_volume": volume,
     }
     counts = {
-        "fines_outside_box": int(np.sum(~centred_inside(network, fines.position))),
+        "fines_outside_box": int(np.sum(~deposit.centred_inside(network, fines.position))),
         "throat_porosity_negative": int(np.sum(porosity < 0)),
         "pore_porosity_negative": int(np.sum((solid > 0) & (solid > network.pore_volume))),
     }
@@ -294,7 +288,7 @@ def refuse_wide(network: Network, fines: Snapshot) -> None:
 
 def _touching_pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pairs]:
     """Throat and fine (K,) of the pairs that touch, with images, and their relative places."""
-    index = np.flatnonzero(reaching_inside(network, fines))
+    index = np.flatnonzero(deposit.reaching_inside(network, fines))
     throat = np.flatnonzero(network.throat_radius > 0)
     ends = network.throat_ends[throat]
     if not len(index) or not len(throat):
@@ -305,10 +299,10 @@ def _touching_pairs(network: Network, fines: Snapshot) -> tuple[Array, Array, Pa
     beyond = network.throat_length[throat] - np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     reach = (network.throat_radius[throat] + np.maximum(beyond, 0.0) + largest)[:, None]
     low, high = low - reach, high + reach
-    position, owner = images_near(
+    position, owner = deposit.images_near(
         network, fines.position[index], low.min(axis=0), high.max(axis=0), 0.0
     )
-    row, image = points_in_boxes(position, low, high)
+    row, image = deposit.points_in_boxes(position, low, high)
     offset, depth = _place_by_axis(ends[:, 0], ends[:, 1], row, position, image)
     throat, fine = throat[row], index[owner[image]]
     sphere = fines.radius[fine]
