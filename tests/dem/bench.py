@@ -1,6 +1,5 @@
 """Benches: a few spheres in a deck of the invasion's own lines, and what is dumped of them."""
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,6 @@ from fdnet.dem.deck import (
     drag_variables,
     number,
     render_text,
-    snapshot_of,
     wall_variables,
     write_data,
 )
@@ -21,16 +19,6 @@ from fdnet.dem.liggghts import Launch, find_binary, run_deck
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import COLUMNS, Frame, read_dump
 from fdnet.spheres.snapshot import Array, Snapshot
-
-HEADER = {
-    "stage": "test",
-    "case_name": "bench",
-    "digest": "-",
-    "left_out": [],
-    "boundary": "f f f",
-    "processors": "",
-}
-"""Variables of the header of a bench."""
 
 
 def bench(
@@ -51,10 +39,9 @@ def bench(
 ) -> list[Frame]:
     """Frames of N spheres with the contacts of `case`, one in `every` so many of the `steps`.
 
-    The first spheres are grains; all come with their velocities. `density` kg/m3 is of each or of
-    all, `step` s, `bounds` (3, 2) m that of the spheres where there is none. `commands` are
-    further lines of the deck, `moving` is the group that is integrated, and `walls` are the ids
-    of the side walls that stand ("wz0"). A frame holds all spheres by id, with their forces.
+    The first are grains. `density` kg/m3 is of each or of all, `step` s, `bounds` (3, 2) m,
+    `commands` are further lines of the deck, `moving` is the group that is integrated, `walls`
+    are the ids of side walls that stand ("wz0"). Frames hold all spheres by id, with forces.
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_data(
@@ -71,7 +58,8 @@ def bench(
     contacts = contact_variables(case, scales_of(case), "invade", friction=friction)
     planes = wall_variables(case, "invade", friction=friction)
     stand = [wall | {"group": moving} for wall in planes if wall["id"] in walls]
-    text = render_text("_header.in.j2", HEADER | {"boundary": boundary})
+    head = {"stage": "test", "case_name": "bench", "digest": "-", "left_out": [], "processors": ""}
+    text = render_text("_header.in.j2", head | {"boundary": boundary})
     text += f"read_data bench.data\nneighbor {number(float(spheres.radius.min()))} bin\n"
     text += "neigh_modify delay 0\ngroup grains type 1\ngroup fines type 2\n"
     text += render_text("_contacts.in.j2", {"contacts": contacts, "time_step": number(step)})
@@ -84,28 +72,7 @@ def bench(
     return list(read_dump(folder / "d.dump"))
 
 
-def states(frames: Sequence[Frame], case: Case) -> list[Snapshot]:
-    """The spheres of each frame in the box of `case`."""
-    return [snapshot_of(frame, case, time_s=0.0) for frame in frames]
-
-
-def drag_text(case: Any, resume: bool = False) -> str:
+def drag_text(case: Any) -> str:
     """The lines of the drag of `case`."""
-    return render_text(
-        "_drag.in.j2", {"drag": drag_variables(case, scales_of(case)), "resume": resume}
-    )
-
-
-def kinetic_energy(velocity: Array, mass: float | Array) -> float:
-    """Sum of m v^2 / 2, J, of N spheres with `velocity` (N, 3) m/s and `mass` kg."""
-    return float(0.5 * np.sum(mass * np.sum(velocity**2, axis=1)))
-
-
-def released(zeta: float) -> float:
-    """Restitution of a damped linear contact that ends at zero force (limitForce on).
-
-    exp(-zeta/s (pi - atan2(2 s zeta, 1 - 2 zeta^2))), s^2 = 1 - zeta^2 (Schwager and Poeschel
-    2007, eq. 20).
-    """
-    s = math.sqrt(1 - zeta**2)
-    return math.exp(-zeta / s * (math.pi - math.atan2(2 * zeta * s, 1 - 2 * zeta**2)))
+    drag = drag_variables(case, scales_of(case))
+    return render_text("_drag.in.j2", {"drag": drag, "resume": False})

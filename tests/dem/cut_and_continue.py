@@ -1,7 +1,5 @@
 """Cut an invasion and continue it: is the result that of an uncut one, in every column?"""
 
-from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +8,9 @@ from builders import tiny
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem.checkpoint import read_watch
-from fdnet.dem.invasion import Invasion, invade
-from fdnet.dem.liggghts import Binary, Launch
+from fdnet.dem.invasion import Invasion
 from fdnet.dem.supply import batches_of
-from fdnet.run.fluid import fluid_of
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.snapshot import Snapshot
-
-SIDES, MOTIONS = ("walls", "periodic"), ("fixed", "mobile")
-SUPPLIES = ("slab", "batches")
-SCHEMES = ("held", "implicit", "viscous")
-MATRIX = tuple(product(SIDES, MOTIONS, SUPPLIES, SCHEMES))
-"""All 24 cells: sides, motion of the grains, supply of the fines, scheme of the drag."""
 
 
 class StopError(Exception):
@@ -29,19 +18,15 @@ class StopError(Exception):
 
 
 def cell_case(sides: str, motion: str, supply: str, scheme: str, *keys: str) -> InvasionCase:
-    """The small case of one cell: 15 grains, 500 fines in four batches, 6 checkpoints."""
+    """15 grains, 500 fines in four batches, 6 checkpoints."""
     return tiny(
         f"box.sides={sides}",
         f"grains.motion={motion}",
         f"fines.supply={supply}",
         f"drag.scheme={scheme}",
         "drag.pressure_gradient=true",
-        "box.size_mm=[1.6,1.0,1.0]",
-        "grains.count=15",
-        "fines.count=500",
-        "run.time_step_factor=0.2",
-        "run.cap_ms=0.15",
-        "run.checkpoint_ms=0.025",
+        *("box.size_mm=[1.6,1.0,1.0]", "grains.count=15", "fines.count=500"),
+        *("run.time_step_factor=0.2", "run.cap_ms=0.15", "run.checkpoint_ms=0.025"),
         *keys,
     )
 
@@ -51,50 +36,33 @@ def places(case: InvasionCase, chunks: int) -> dict[str, tuple[int, ...]]:
     batches = len(batches_of(case, scales_of(case)).counts)
     whole = 1 if batches == 1 else batches - 1
     return {
+        "at every checkpoint": tuple(range(1, chunks + 1)),
         "in the first chunk": (0,),
         "after the first chunk": (1,),
         "between batches": (max(1, whole - 1),),
         "after the last batch": (whole,),
         "in the last chunk": (chunks - 1,),
-        "at every checkpoint": tuple(range(1, chunks + 1)),
     }
 
 
-def differences(
-    case: InvasionCase,
-    grains: Snapshot,
-    folder: Path,
-    binary: Binary,
-    *,
-    ranks: int = 1,
-    everywhere: bool = False,
-) -> list[str]:
+def differences(go, case, folder: Path, *, ranks: int = 1, everywhere: bool = False) -> list[str]:
     """What differs between the uncut and continued invasions; empty when nothing does.
 
-    All are run below `folder`. One is cut at every checkpoint; `everywhere` adds one for each
-    other place. What the invasion says, all overlaps that were watched, every column of the
-    spheres at the end and the last restart are compared bit for bit.
+    One is cut at every checkpoint; `everywhere` adds one for each other place. All that they say
+    and every column of the spheres at the end are compared bit for bit.
     """
-    launch, scales = Launch(binary=binary, ranks=ranks), scales_of(case)
-
-    def drive(name: str, launch: Launch) -> Invasion:
-        fluid = fluid_of(case, scales, grains)
-        return invade(case, scales, grains, folder / name, launch, fluid=fluid)
-
-    def stop_at(chunk: int) -> Launch:
-        def stop(line: str) -> None:
-            if line.lstrip().startswith(f"FDNET checkpoint {chunk} " if chunk else "Step "):
-                raise StopError
-
-        return replace(launch, follow=stop)
-
-    whole, different = drive("whole", launch), []
+    whole, different = go(case, folder / "whole", ranks=ranks), []
     cuts = places(case, len(whole.history))
     for place in cuts if everywhere else ("at every checkpoint",):
         for chunk in cuts[place]:
+
+            def stop(line: str, mark: str = f"FDNET checkpoint {chunk} " if chunk else "Step "):
+                if line.lstrip().startswith(mark):
+                    raise StopError
+
             with pytest.raises(StopError):
-                drive(place, stop_at(chunk))
-        again = drive(place, launch)
+                go(case, folder / place, ranks=ranks, follow=stop)
+        again = go(case, folder / place, ranks=ranks)
         ends = [end_of(one, folder / name) for one, name in ((again, place), (whole, "whole"))]
         different += [f"{place}: {name}" for name in ends[0] if ends[0][name] != ends[1][name]]
     return different

@@ -7,7 +7,7 @@ from importlib.resources import files
 import jinja2
 import numpy as np
 import pytest
-from builders import followed, resting_spheres, tiny
+from builders import followed, naming, resting_spheres, tiny
 from jinja2 import nodes
 
 from fdnet.dem.deck import specimen_box
@@ -28,13 +28,12 @@ def invade_deck(*assignments: str, **more):
     return render_invade(case, scales_of(case), grain_of(case), **more)
 
 
-def invade_text(*assignments: str, ranks: int = 1) -> str:
-    return invade_deck(*assignments, ranks=ranks).text
+def invade_text(*assignments: str) -> str:
+    return invade_deck(*assignments).text
 
 
 def pack_text(*assignments: str) -> str:
-    case = tiny(*assignments)
-    return render_pack(case, count=66).text
+    return render_pack(tiny(*assignments), count=66).text
 
 
 def commands(text: str) -> list[str]:
@@ -59,17 +58,7 @@ def test_gravity_is_left_out_when_negligible_and_reported():
     text = invade_text()
     assert not has(text, "gravity|buoyancy")
     assert "# left out: gravity and buoyancy (gravity is" in text
-    on = invade_text("gravity.mode=on")
-    pull = 9.81 * (1 - 1095 / 2146)
-    assert has(on, rf"^fix grav_fines fines gravity {pull} vector 0.0 0.0 -1.0$")
-    assert not has(on, "grav_grains|buoyancy density")
-    heavy = invade_text("gravity.mode=on", "gravity.buoyancy=false")
-    assert has(heavy, r"^fix grav_fines fines gravity 9.81 vector 0.0 0.0 -1.0$")
-    assert "# left out: buoyancy (switched off)" in heavy
-
-
-def test_the_neighbour_search_is_the_measured_best():
-    assert has(invade_text(), r"^neighbor 5e-05 bin$")
+    assert not has(invade_text("gravity.mode=on"), "grav_grains|buoyancy density")
 
 
 def test_lost_atoms_are_errors_and_the_end_is_marked():
@@ -96,14 +85,12 @@ def test_radii_are_uniform_by_number_and_the_last_closes_the_target():
 
 def test_the_stop_rule_allows_a_share_of_the_inflow():
     """At rate 0 not one; else the share of c A u t_plug / v fines, over the whole plug time."""
-    strict = invade_text()
-    assert has(strict, r"variable still equal \$\{most\}$")
-    case = tiny("run.plug_rate=0.3", "run.plug_time_ms=0.2")
-    scales = scales_of(case)
+    assert has(invade_text(), r"variable still equal \$\{most\}$")
+    keys = ("run.plug_rate=0.3", "run.plug_time_ms=0.2")
     area, volume = 1.6e-3**2, 4 / 3 * math.pi * (0.05e-3) ** 3
-    arrivals = 0.1 * area * scales.upstream_velocity * 0.2e-3 / volume
-    text = invade_text("run.plug_rate=0.3", "run.plug_time_ms=0.2")
-    assert has(text, rf"variable still equal \$\{{most\}}\+{math.floor(0.3 * arrivals)}$")
+    arrivals = 0.1 * area * scales_of(tiny(*keys)).upstream_velocity * 0.2e-3 / volume
+    allowed = math.floor(0.3 * arrivals)
+    assert has(invade_text(*keys), rf"variable still equal \$\{{most\}}\+{allowed}$")
 
 
 def test_the_deck_watches_where_it_can_and_says_where_it_cannot():
@@ -136,3 +123,70 @@ def test_render_shows_the_coupled_parts_with_what_it_is_fed_and_replaces_nothing
     assert "f_uf[3]" in (folder / "ask.in").read_text()
     render_decks(tiny(), tmp_path / "plain")
     assert [one.name for one in (tmp_path / "plain" / "invade").iterdir()] == ["in.invade"]
+
+
+# ---- Each option of a case gives its exact lines, computed here by hand.
+HOOKE = "wall/gran model hooke/stiffness"
+MU = "fix mu all property/global coefficientFriction peratomtypepair 3"
+PAIR = "pair_style gran model hooke/stiffness tangential history"
+GRAVITY = "fix grav_fines fines gravity"
+END, OFF = "limitForce on", "tangential_damping off"
+DRAG = 6.0 * math.pi * 0.05  # Stokes's 6 pi mu of 50 cP, N s/m2
+WALL = f"fix wy1 fines {HOOKE} primitive type 3 yplane 0.0016 {END}"
+INVADE = {
+    (): [
+        *("boundary f f f", f"{MU} 0.55 0.55 0.0 0.55 0.55 0.0 0.0 0.0 0.0"),
+        *(f"{PAIR} {OFF} {END}", WALL),
+        *("fix still grains freeze", "fix integ fines nve/sphere"),
+        f"variable fx atom {DRAG!r}*r*(f_uf[1]-vx)",
+    ],
+    ("box.sides=periodic",): ["boundary f p p", f"-{WALL}"],
+    ("box.wall_friction=0.3",): [
+        f"{MU} 0.55 0.55 0.3 0.55 0.55 0.3 0.3 0.3 0.3",
+        f"fix wy1 fines {HOOKE} tangential history primitive type 3 yplane 0.0016 {OFF} {END}",
+    ],
+    ("fines.friction=0.4",): [f"{MU} 0.55 0.4 0.0 0.4 0.4 0.0 0.0 0.0 0.0"],
+    ("grains.friction=0.2",): [f"{MU} 0.2 0.2 0.0 0.2 0.55 0.0 0.0 0.0 0.0"],
+    ("contact.rolling_friction=0.1",): [
+        "fix roll all property/global coefficientRollingFriction peratomtypepair 3" + 9 * " 0.1",
+        f"{PAIR} rolling_friction epsd2 {OFF} {END}",
+    ],
+    ("contact.restitution=liquid",): [f"{PAIR} {OFF} limitForce off"],
+    ("contact.model=hertz",): [
+        *("hard_particles yes", f"pair_style gran model hertz tangential history {OFF} {END}"),
+        WALL.replace("hooke/stiffness", "hertz"),
+    ],
+    ("grains.motion=mobile",): [
+        *("fix integ all nve/sphere", "-fix still grains freeze", WALL.replace("fines", "all")),
+        f"fix wx1 grains {HOOKE} primitive type 3 xplane 0.003 {END}",
+    ],
+    ("drag.multiplier=2.0",): [f"variable fy atom {2.0 * DRAG!r}*r*(f_uf[2]-vy)"],
+    ("fluid.velocity_m_s=0.5",): ["set group fines property/atom uf 0.5 0.0 0.0"],
+    ("drag.refresh_steps=5",): ["fix st fines store/state 5 v_fx v_fy v_fz"],
+    ("run.time_step_s=2e-8",): ["timestep 2e-08"],
+    ("run.cap_ms=0.5",): ["variable chunk loop 1 20"],
+    ("gravity.mode=on",): [f"{GRAVITY} {9.81 * (1 - 1095 / 2146)} vector 0.0 0.0 -1.0"],
+    ("gravity.mode=on", "gravity.buoyancy=false"): [
+        *("# left out: buoyancy (switched off)", f"{GRAVITY} 9.81 vector 0.0 0.0 -1.0")
+    ],
+}
+"""Lines by what is set; a hyphen stands before one that is left out."""
+PACK = {
+    (): ["boundary f f f", f"fix wx1 all {HOOKE} primitive type 2 xplane 0.003 {END}"],
+    ("box.sides=periodic",): [
+        *("boundary f p p", f"-fix wy0 all {HOOKE} primitive type 2 yplane 0.0 {END}")
+    ],
+    ("grains.packing_stiffness_N_m=2000",): [
+        "fix kn all property/global kn peratomtypepair 2" + 4 * " 2000.0"
+    ],
+    ("contact.model=hertz",): [f"pair_style gran model hertz {END}"],
+}
+
+
+@pytest.mark.parametrize(("options", "text"), [(INVADE, invade_text), (PACK, pack_text)])
+def test_every_option_has_its_lines(options, text):
+    for chosen, wanted in options.items():
+        lines = text(*chosen).splitlines()
+        for line in wanted:
+            with naming(chosen, line):
+                assert (line.removeprefix("-") in lines) is not line.startswith("-")

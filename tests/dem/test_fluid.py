@@ -1,6 +1,5 @@
 """The fluid that answers for its fines: crowds, and the flow of the network after its deposit."""
 
-import itertools
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,32 +8,23 @@ import pytest
 from builders import followed, resting_spheres
 
 from fdnet.case.file import case_from
+from fdnet.dem import invade_deck as deck
 from fdnet.dem.checkpoint import quiet_chunks
-from fdnet.dem.deck import snapshot_of, specimen_box, write_data
-from fdnet.dem.invade_deck import (
-    FluidForces,
-    Moment,
-    fine_density,
-    read_state,
-    render_invade,
-    write_forces,
-    write_parts,
-)
+from fdnet.dem.deck import specimen_box, write_data
 from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Launch, find_binary, run_deck
+from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.supply import batches_of, densities
 from fdnet.errors import CaseError
 from fdnet.network.field.field import velocity_field
 from fdnet.run.cake import cake_summary, measure_cake
 from fdnet.run.fluid import Movers, NetworkFluid, fluid_of, history_rows, mean_ahead
-from fdnet.run.network_flow import Renewal, on_each_fine, pore_through
+from fdnet.run.network_flow import Renewal, on_each_fine
 from fdnet.scales.scales import scales_of
 from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 pytestmark = pytest.mark.liggghts
-LAUNCH = Launch(binary=find_binary())
-FIRST = Moment(step=0, time=0.0, before=None, fresh=True)
+FIRST = deck.Moment(step=0, time=0.0, before=None, fresh=True)
 
 
 @pytest.fixture(scope="module")
@@ -44,20 +34,8 @@ def fluid(grains_of) -> NetworkFluid:
 
 
 @pytest.fixture(scope="module")
-def go(binary):
-    """Invade with a fluid in a folder."""
-
-    def invaded(fluid, folder, driving=None):
-        launch = Launch(binary=binary)
-        fluid_ = driving or fluid
-        return invade(fluid.case, fluid.scales, fluid.grains, folder, launch, fluid=fluid_)
-
-    return invaded
-
-
-@pytest.fixture(scope="module")
 def done(go, fluid, tmp_path_factory):
-    return go(fluid, tmp_path_factory.mktemp("done"))
+    return go(fluid.case, tmp_path_factory.mktemp("done"), fluid)
 
 
 def fines(position, radius, box, velocity=(0.0, 0.0, 0.0)) -> Snapshot:
@@ -65,26 +43,24 @@ def fines(position, radius, box, velocity=(0.0, 0.0, 0.0)) -> Snapshot:
     return replace(made, velocity=np.tile(velocity, (len(made), 1)))
 
 
-def with_case(fluid, *more, scales=None, **way):
-    """The same pack in a case with other settings; the pack is not solved again.
-
-    The `scales` are those of that case unless they are given.
-    """
+def with_case(fluid, *more, **way):
+    """The same pack in a case with other settings; the pack is not solved again."""
     case = followed(*more, **way)
-    other = replace(fluid, case=case, scales=scales or scales_of(case))
+    other = replace(fluid, case=case, scales=scales_of(case))
     other.__dict__["pack"] = fluid.pack
     return other
 
 
 def deposit_of(done) -> Snapshot:
-    return replace(done.state.fines(), velocity=np.zeros((len(done.state.fines()), 3)))
+    spheres = done.state.fines()
+    return replace(spheres, velocity=np.zeros_like(spheres.velocity))
 
 
 def test_batches_come_as_the_mud_that_slows_down_carries_them(go, fluid, tmp_path):
     """The mud has moved by the filtrate over the face; a batch enters before it is needed."""
     keys = ("fines.supply=batches", "fines.count=600", "run.checkpoint_ms=0.02", "run.cap_ms=0.3")
     other = with_case(fluid, *keys)
-    result = go(other, tmp_path)
+    result = go(other.case, tmp_path, other)
     batches, area = batches_of(other.case, other.scales), fluid.pack.network.area
     table = history_rows(other.case, other.scales, result.history, result.updates)
     entered = [batches.entered_with(line["supplied_count"]) for line in table]
@@ -112,21 +88,6 @@ def test_an_intact_pack_carries_all_and_its_grains_take_up_the_pressure_drop(flu
     assert np.all(carried.pressed.groups == 0.0)
 
 
-def test_pores_carry_what_enters_them(fluid):
-    """The mean share over the layers of pores: each plane across the flow carries all of it."""
-    pack, network = fluid.pack, fluid.pack.network
-    through = pore_through(network, pack.flow)
-    assert np.all(through >= 0)
-    assert through.max() < 1.0 + 1e-9
-    first, second = network.throat_pores.T
-    x = network.pore_position[:, 0]
-    for plane in (0.4e-3, 0.8e-3, 1.2e-3):
-        crossing = (x[first] - plane) * (x[second] - plane) < 0
-        sign = np.sign(x[second] - x[first])
-        flux = (pack.flow.throat_flux * sign)[crossing].sum()
-        assert flux == pytest.approx(pack.flow.inflow, rel=1e-6)
-
-
 def test_the_overbalance_is_the_first_drop_of_pressure(fluid):
     """Over the pack's own permeability and the rest of the way, with inertia where it counts."""
     viscosity, permeability = fluid.case.fluid.viscosity_Pa_s, fluid.pack.permeability
@@ -135,9 +96,8 @@ def test_the_overbalance_is_the_first_drop_of_pressure(fluid):
         pressure = viscosity * other.first_velocity * 1e-3 * length / permeability
         assert pressure == pytest.approx(other.case.fluid.overbalance_Pa, rel=1e-9)
     around = ("well.radius_mm=108.0", "well.drainage_radius_m=100.0")
-    tight = with_case(
-        fluid, *around, "well.formation_permeability_mD=50.0", way="fluid.overbalance_MPa=2.0"
-    )
+    around += ("well.formation_permeability_mD=50.0",)
+    tight = with_case(fluid, *around, way="fluid.overbalance_MPa=2.0")
     path = 0.108 * np.log(100.0 / 0.108)
     resistance = 1.6e-3 / permeability + (path - 1.6e-3) / (50.0 * 9.869233e-16)
     velocity = tight.first_velocity / tight.scales.force_factor
@@ -234,10 +194,7 @@ def test_the_balance_holds_while_fines_move_at_another_pace_than_the_fluid(fluid
 
 
 def test_the_fines_take_the_share_of_the_pressure_that_resolved_flow_gives_them(fluid, done):
-    """Stokes flow around grains and fines, to a factor of 2: its forces know no network.
-
-    The deposit of 15 grains differs from processor to processor, and the factor from 1.4 to 1.6.
-    """
+    """Stokes flow around grains and fines, to a factor of 2, which knows no network."""
     standing = deposit_of(done)
     depth = standing.position[:, 0]
     inside = standing.where((depth > 5e-5) & (depth < fluid.pack.length))
@@ -276,10 +233,9 @@ def test_updates_from_the_former_one_give_what_a_full_one_gives(fluid, done):
 
 def test_the_ledger_adds_up_and_momentum_closes(fluid, done):
     rows = done.updates
-    passed = [
-        one["rate_m3_s"] * (two["time_s"] - one["time_s"]) for one, two in itertools.pairwise(rows)
-    ]
-    assert rows[-1]["filtrate_m3"] == pytest.approx(sum(passed), rel=1e-9)
+    rate, time = (np.array([row[name] for row in rows]) for name in ("rate_m3_s", "time_s"))
+    passed = float(rate[:-1] @ np.diff(time))
+    assert rows[-1]["filtrate_m3"] == pytest.approx(passed, rel=1e-9)
     assert rows[0]["rate_over_initial"] == pytest.approx(1.0, rel=0.02)
     assert rows[-1]["rate_over_initial"] < 0.95
     area, whole = fluid.pack.network.area, rows[0]
@@ -299,11 +255,10 @@ def test_a_rate_or_a_volume_that_is_asked_for_ends_the_run(go, fluid, done, tmp_
     share = done.updates[len(done.updates) // 2]["rate_over_initial"]
     asked = float(0.5 * done.updates[-1]["filtrate_m3"] / pores)
     results = {}
-    for reason, key in (
-        ("plugged", f"run.stop_rate={share}"),
-        ("duration", f"run.stop_pore_volumes={asked!r}"),
-    ):
-        result = results[reason] = go(with_case(fluid, key), tmp_path / reason)
+    by_rate, by_volume = f"run.stop_rate={share}", f"run.stop_pore_volumes={asked!r}"
+    for reason, key in (("plugged", by_rate), ("duration", by_volume)):
+        other = with_case(fluid, key)
+        result = results[reason] = go(other.case, tmp_path / reason, other)
         assert result.stop_reason == reason
         assert 0 < len(result.history) < len(done.history)
         assert result.updates == done.updates[: len(result.updates)]
@@ -319,7 +274,7 @@ def test_a_face_is_plugged_once_all_that_moves_has_come_to_rest(go, fluid, tmp_p
         "fines={radius_mm=[0.03,0.11], friction=0.0, count=150, concentration=0.2, supply='slab'}",
         *("run.plug_time_ms=0.06", "run.checkpoint_ms=0.02", "run.cap_ms=2.0"),
     )
-    result, chunks = go(other, tmp_path), quiet_chunks(other.scales)
+    result, chunks = go(other.case, tmp_path, other), quiet_chunks(other.scales)
     entered = [row.invaded + row.passed for row in result.history]
     crossed = [row.invaded + 2 * row.passed for row in result.history]
     assert result.stop_reason == "plugged"
@@ -334,7 +289,7 @@ def test_a_face_is_plugged_once_all_that_moves_has_come_to_rest(go, fluid, tmp_p
 def test_a_slab_at_constant_rate_raises_the_pressure(go, fluid, tmp_path):
     """The mud comes on as at the start, the filtrate is rate times time, the pressure grows."""
     other = with_case(fluid, "drag.drive=rate", "run.cap_ms=0.3")
-    result = go(other, tmp_path)
+    result = go(other.case, tmp_path, other)
     assert other.case.fines.supply == "slab"
     assert result.stop_reason == "cap"
     first, last = result.updates[0], result.updates[-1]
@@ -354,7 +309,7 @@ def test_what_does_not_go_with_the_network_is_refused():
         (["grains.motion=mobile"], "grains.motion: 'mobile' with drag.field 'network'"),
         ([uniform, "drag.drive=rate"], "drag.drive: 'rate' belongs to"),
         (["drag.drive=rate", "run.stop_rate=0.1"], "run.stop_rate: 0.1 needs a rate that"),
-        ([uniform, "run.stop_pore_volumes=2"], "run.stop_pore_volumes: 2.0 belongs to drag.field"),
+        ([uniform, "run.stop_pore_volumes=2"], "run.stop_pore_volumes: 2.0 belongs to drag"),
         (["drag.inertia=none"], "drag.inertia: 'none' belongs to drag.field 'uniform'"),
         (["drag.scheme=viscous"], "drag.scheme: 'viscous' belongs to drag.field 'uniform'"),
         (["drag.pressure_gradient=false"], "drag.pressure_gradient: False belongs to"),
@@ -386,8 +341,10 @@ class Watched:
 
     def __init__(self, fluid):
         self.fluid, self.measured, self.answer, self.compared = fluid, fluid.measured, {}, 0
+        self.seen = []
 
     def forces(self, spheres, moment):
+        self.seen.append((spheres.fines(), moment.density))
         known = [self.answer.get(one, 0.0) for one in spheres.fines().id]
         assert moment.given == pytest.approx(known, rel=1e-9)
         self.compared += np.count_nonzero(known)
@@ -401,123 +358,61 @@ def test_liggghts_shows_the_velocity_that_each_fine_was_given(go, fluid, tmp_pat
     keys = ("fines.supply=batches", "fines.count=600", "run.cap_ms=0.15")
     other = with_case(fluid, *keys)
     watched = Watched(other)
-    go(other, tmp_path, watched)
+    go(other.case, tmp_path, watched)
     assert watched.compared > 1000
 
 
 # ---- What LIGGGHTS shows and takes in.
-def small(*more):
-    """15 grains and fines in batches."""
-    keys = ("fluid.darcy_length_mm=20.0", "fines.supply=batches", "fines.count=400")
-    keys += ("run.cap_ms=0.25", "run.checkpoint_ms=0.05", "fines.concentration=0.1")
-    return followed(*keys, *more, way="drag.multiplier=1.0")
-
-
-def given_forces(coefficient, velocity) -> FluidForces:
-    push = np.zeros_like(velocity)
-    return FluidForces(
-        coefficient=coefficient, velocity=velocity, push=push, pace=1.0, measures={}
-    )
-
-
-def test_the_fluid_is_asked_with_the_density_of_each_fine(grains_of, tmp_path):
+def test_the_fluid_is_asked_with_the_density_of_each_fine(go, grains_of, tmp_path):
+    sizes = {"D10_mm": 0.09, "D90_mm": 0.11}
     materials = [
-        {
-            "name": name,
-            "share": density,
-            "density_kg_m3": density,
-            "sizes": {"D10_mm": 0.09, "D90_mm": 0.11},
-        }
+        {"name": name, "share": density, "density_kg_m3": density, "sizes": sizes}
         for name, density in (("light", 1100.0), ("heavy", 2200.0))
     ]
     supply = {"count": 400, "supply": "batches", "materials": materials}
-    case, seen = case_from(small().data() | {"fines": supply}), []
-    scales, grains = scales_of(case), grains_of(small())
-    fluid = fluid_of(case, scales, grains)
-
-    class Asked:
-        measured = fluid.measured
-        keep = recall = lambda self, path: None
-
-        def forces(self, spheres, moment):
-            seen.append((spheres.fines(), moment.density))
-            return fluid.forces(spheres, moment)
-
-    invade(case, scales, grains, tmp_path, LAUNCH, fluid=Asked())
-    everyone = densities(case, batches_of(case, scales).counts)
-    assert len(seen) >= 5
-    for present, density in seen:
+    keys = ("run.cap_ms=0.25", "run.checkpoint_ms=0.05", "fluid.darcy_length_mm=20.0")
+    case = case_from(followed(*keys, way="drag.multiplier=1.0").data() | {"fines": supply})
+    watched, grains = Watched(fluid_of(case, scales_of(case), grains_of(case))), grains_of(case)
+    go(case, tmp_path, watched)
+    everyone = densities(case, batches_of(case, scales_of(case)).counts)
+    assert len(watched.seen) >= 5
+    for present, density in watched.seen:
         assert np.array_equal(density, everyone[present.id.astype(int) - 1 - int(grains.id.max())])
         assert set(density) == {1100.0, 2200.0}
 
 
-def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(tmp_path):
+def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(binary, tmp_path):
     """No number of the first forces is left after the second ones, where zeros have no rows."""
     case = followed()
     box, place = specimen_box(case), [[2e-4, 5e-4, 5e-4], [6e-4, 5e-4, 5e-4]]
     two = resting_spheres(place, 5e-5, box, kind=Kind.FINE, first=2)
-    write_scene(case, two, tmp_path, density=[2650.0, 2650.0, 1100.5])
+    grain = Snapshot.from_arrays([[-1e-3, 1e-3, 1e-3]], 3e-4, box=box)
+    bounds = box + np.array([[-2e-3, 1e-3], [0.0, 0.0], [0.0, 0.0]])
+    density = np.array([2650.0, 2650.0, 1100.5])
+    data = tmp_path / "invade.data"
+    write_data(data, grain.joined(two), bounds=bounds, density=density, types=3)
+    (tmp_path / "in.invade").write_text(deck.render_invade(case, scales_of(case), grain).text)
+    (tmp_path / "post").mkdir()
+    deck.write_parts(case, scales_of(case), grain, tmp_path)
+    still = {"coefficient": np.ones(2), "push": np.zeros((2, 3)), "pace": 1.0, "measures": {}}
     given = np.array([[[1.0, 2.0, -3.0], [4.0, 5.0, 6.0]], [[7.0, 0.0, 0.0], [0.0, -8.0, 0.0]]])
 
     def play(feed):
         feed("include in.invade", "include ask.in")
-        assert np.array_equal(fine_density(read_state(tmp_path)), [2650.0, 1100.5])
+        assert np.array_equal(deck.fine_density(deck.read_state(tmp_path)), [2650.0, 1100.5])
         for number, velocity in enumerate(given):
-            write_forces(tmp_path, two, given_forces(np.ones(2), velocity))
+            deck.write_forces(tmp_path, two, deck.FluidForces(velocity=velocity, **still))
             show = f"write_dump fines custom post/{number}.dump id f_uf[1] f_uf[2] f_uf[3]"
             feed("include fluid.in", f"{show} modify sort id")
 
-    run_deck(tmp_path, "in.invade", LAUNCH, play)
+    run_deck(tmp_path, "in.invade", Launch(binary=binary), play)
     for number, velocity in enumerate(given):
         frame = read_frame(tmp_path / "post" / f"{number}.dump")
         shown = np.column_stack([frame.column(f"f_uf[{axis}]") for axis in (1, 2, 3)])
         assert np.array_equal(shown, velocity)
 
 
-def write_scene(case, fines, folder, *, density) -> Snapshot:
-    """Write the deck of `fines` that a coupled invasion begins with; returns its one grain.
-
-    `density` kg/m3 is that of the grain and of each fine.
-    """
-    scales = scales_of(case)
-    grain = Snapshot.from_arrays([[-1e-3, 1e-3, 1e-3]], 3e-4, box=fines.box)
-    beyond = np.array([[-2e-3, 1e-3], [0.0, 0.0], [0.0, 0.0]])
-    write_data(
-        folder / "invade.data",
-        grain.joined(fines),
-        bounds=fines.box + beyond,
-        density=np.array(density),
-        types=3,
-    )
-    (folder / "in.invade").write_text(render_invade(case, scales, grain).text)
-    (folder / "post").mkdir()
-    write_parts(case, scales, grain, folder)
-    return grain
-
-
-def applied_force(case, fines, folder) -> np.ndarray:
-    """Force (N,) N along x that LIGGGHTS puts on standing fines beside that of their contacts."""
-    scales = scales_of(case)
-    grain = write_scene(case, fines, folder, density=[2650.0] * (len(fines) + 1))
-
-    def play(feed):
-        show = 'write_dump fines custom post/{}.dump id fx modify sort id format "%d %.17g"'
-        feed("include in.invade", "velocity fines set 0.0 0.0 0.0")
-        feed("run 0", show.format("without"), "include ask.in")
-        shown = snapshot_of(read_state(folder), case, time_s=0.0)
-        assert np.array_equal(shown.id, fines.id)
-        write_forces(folder, shown, fluid_of(case, scales, grain).forces(shown, FIRST))
-        feed("include fluid.in", "run 0", show.format("with"))
-
-    run_deck(folder, "in.invade", LAUNCH, play)
-    first, second = (read_frame(folder / "post" / f"{name}.dump") for name in ("without", "with"))
-    return second.column("fx") - first.column("fx")
-
-
 # ---- What fines meet on the way until the next update.
-TRACER, FINE = 1e9, "fines.radius_mm=0.0125"
-
-
 def movers(place, rate, velocity=(0.0, 0.0, 0.0)) -> Movers:
     return Movers(position=np.array([place]), velocity=np.array([velocity]), rate=np.array([rate]))
 
@@ -535,7 +430,7 @@ def test_drag_takes_up_the_slip_exactly():
 def test_the_mean_over_the_way_in_a_flow_that_speeds_up():
     """A tracer in u = a x goes to x exp(a T). The fluid where it begins is 1.7 times as slow."""
     a, time, start = 5.0, 0.2, 0.3
-    mean = mean_ahead(movers((start, 0.0, 0.0), TRACER), lambda at: a * at, time)
+    mean = mean_ahead(movers((start, 0.0, 0.0), 1e9), lambda at: a * at, time)
     assert mean[0, 0] == pytest.approx(start * (np.exp(a * time) - 1) / time, rel=0.02)
     assert mean[0, 1:] == pytest.approx(0.0)
     slow = mean_ahead(movers((0.3, 0.0, 0.0), 1e-9), lambda at: a * at, time)

@@ -5,7 +5,6 @@ import re
 import signal
 import subprocess
 import sys
-import textwrap
 import time
 from pathlib import Path
 
@@ -91,27 +90,18 @@ def test_a_run_is_stopped_at_its_time_limit(fake, tmp_path):
 def test_the_run_dies_with_its_parent(fake, tmp_path):
     """kill -9 of Python must not leave an orphan that writes into a resumed run."""
     (tmp_path / "mode").write_text("hang")
-    code = textwrap.dedent(f"""
-        from pathlib import Path
-        from fdnet.dem.liggghts import find_binary
-        from fdnet.dem.liggghts import Launch, run_deck
-        launch = Launch(binary=find_binary({str(fake.path)!r}))
-        run_deck(Path({str(tmp_path)!r}), "in.deck", launch)
-    """)
+    code = "from pathlib import Path\nfrom fdnet.dem.liggghts import *\n"
+    code += f"launch = Launch(binary=find_binary({str(fake.path)!r}))\n"
+    code += f"run_deck(Path({str(tmp_path)!r}), 'in.deck', launch)"
     parent = subprocess.Popen([sys.executable, "-c", code], start_new_session=True)
     screen = tmp_path / "screen.txt"
-    deadline = time.monotonic() + 30
-    while time.monotonic() < deadline and not (
-        screen.exists() and "started" in screen.read_text()
-    ):
-        time.sleep(0.05)
+    until(lambda: screen.exists() and "started" in screen.read_text())
     children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
     assert children
     parent.send_signal(signal.SIGKILL)
     parent.wait()
-    while time.monotonic() < deadline and any(_alive(int(child)) for child in children):
-        time.sleep(0.05)
-    assert not any(_alive(int(child)) for child in children)
+    until(lambda: not any(map(_alive, children)))
+    assert not any(map(_alive, children))
 
 
 def test_a_folder_where_liggghts_still_writes_is_refused(fake, tmp_path, monkeypatch):
@@ -127,7 +117,14 @@ def test_a_folder_where_liggghts_still_writes_is_refused(fake, tmp_path, monkeyp
     assert run(fake, tmp_path, "ok").ranks == 1
 
 
-def _alive(pid: int) -> bool:
+def until(done) -> None:
+    """Wait until that is so, for at most 30 s."""
+    deadline = time.monotonic() + 30
+    while time.monotonic() < deadline and not done():
+        time.sleep(0.05)
+
+
+def _alive(pid: str) -> bool:
     try:
         return Path(f"/proc/{pid}/stat").read_text().split(")")[1].split()[0] != "Z"
     except FileNotFoundError:

@@ -46,10 +46,7 @@ def test_porosity_is_met_at_rest_and_a_seed_has_one_pack(packed):
     pack = packed(box, f"grains={{{dense}}}")
     assert pack.porosity_error < 0.001
     assert pack.porosity_sum < pack.porosity
-    first, again = (
-        packed("grains.count=66"),
-        packed("grains.count=66", "run.stiffness_N_m=300.0", ranks=2),
-    )
+    first, again = packed(), packed("run.stiffness_N_m=300.0", ranks=2)
     assert np.array_equal(first.grains.position, again.grains.position)
     assert tiny().digest("pack") == tiny("run.stiffness_N_m=300.0").digest("pack")
     for grains, porosity, made, case in (
@@ -73,9 +70,8 @@ def test_a_pack_that_creeps_is_taken_and_one_that_moves_is_refused(tmp_path):
     still = resting(np.random.default_rng(1).random((50, 3)) * 1e-3, 0.25e-3, specimen_box(case))
     direction = np.random.default_rng(2).normal(size=(50, 3))
     direction /= np.sqrt(np.mean(np.sum(direction**2, axis=1)))
-    slow, fast = (
-        replace(still, velocity=share * natural * direction) for share in (0.99e-5, 1.01e-5)
-    )
+    speeds = 0.99e-5 * natural, 1.01e-5 * natural
+    slow, fast = (replace(still, velocity=speed * direction) for speed in speeds)
     assert creep_of(case, step, tmp_path, slow) == pytest.approx(0.99e-5 * natural)
     with pytest.raises(LiggghtsError, match="did not come to rest in 80000 steps"):
         creep_of(case, step, tmp_path, fast)
@@ -96,27 +92,21 @@ def test_radii_that_the_case_does_not_ask_for_are_refused(tmp_path):
 
 def test_what_cannot_be_packed_is_an_error_with_what_can(packed):
     small = "box.size_mm=[1.2,1.2,1.2]"
+    tight = "0.27 needs .* a porosity of 0.35. at random .*, and about 0.[23]. within"
+    many = r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs"
     for keys, message in (
         (("porosity=0.12, max_overlap=0.08",), "pushed out of it"),
-        (
-            ("porosity=0.27, max_overlap=0.08",),
-            "0.27 needs .* a porosity of 0.35. at random .*, and about 0.[23]. within",
-        ),
+        (("porosity=0.27, max_overlap=0.08",), tight),
         (("porosity=0.47", small), "one grain is"),
-        (
-            ("count=98",),
-            r"grains\.count: 98 needs (grains that overlap|more room)|98 grains needs",
-        ),
+        (("count=98",), many),
     ):
         with pytest.raises(CaseError) as error:
             packed(f"grains={{radius_mm=0.25, {keys[0]}}}", *keys[1:])
         assert re.search(message, str(error.value)), keys
 
 
-def test_a_pack_that_does_not_rest_is_made_again_from_the_next_places_and_given_up(
-    binary, packed, tmp_path, monkeypatch
-):
-    """The first one is called restless; the second starts from other places, the same radii."""
+def test_a_pack_that_does_not_rest_is_made_again(binary, packed, tmp_path, monkeypatch):
+    """The second starts from other places with the same radii; after some it is given up."""
     for name, value in (("REST_RUNS", 1), ("RELAX_RUN_STEPS", 10), ("PLACES", 2)):
         monkeypatch.setattr(f"fdnet.dem.packing.{name}", value)
     with pytest.raises(RestlessError, match="tried 2 times from other places"):

@@ -27,11 +27,6 @@ from fdnet.scales.scales import scales_of
 from fdnet.scales.table import scale_rows
 
 ON = "drag.pressure_gradient=true"
-NAUMANN = "drag.inertia=schiller-naumann"
-
-
-def values_of(case):
-    return {row.name: row.value for row in scale_rows(case, scales_of(case))}
 
 
 # ---- One fine: drag, pressure gradient and Reynolds number.
@@ -39,7 +34,8 @@ def test_the_gradient_over_the_drag_of_the_thesis_specimens(root):
     """(2/9) r^2 phi / k, worked out in the review of the invasion half."""
     for specimen, ratio in enumerate((5.6, 2.2, 0.54, 2.3, 0.90, 0.225), start=1):
         case = read_case(root / f"cases/specimen{specimen}.toml")
-        scales, rows = scales_of(case), values_of(case)
+        scales = scales_of(case)
+        rows = {row.name: row.value for row in scale_rows(case, scales)}
         assert scales.gradient_over_drag == pytest.approx(ratio, rel=0.02), specimen
         assert scales.drift_velocity == scales.interstitial_velocity, "not in the thesis"
         assert rows["pressure gradient over drag"] == scales.gradient_over_drag

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fdnet.errors import MechanicsError
+from fdnet.mechanics import triaxial as loading
 from fdnet.mechanics.elastic import elastic_of, voigt_average
 from fdnet.mechanics.springs import (
     Cement,
@@ -19,18 +20,7 @@ from fdnet.mechanics.springs import (
     kinematics,
     stiffness_matrix,
 )
-from fdnet.mechanics.triaxial import (
-    SOUND,
-    TENSION,
-    Load,
-    Triaxial,
-    at_rest,
-    balance,
-    carried_out,
-    loaded_pack,
-    overloaded,
-    triaxial,
-)
+from fdnet.mechanics.triaxial import Triaxial, triaxial
 from fdnet.spheres.snapshot import resting
 from tests.network import packs
 
@@ -105,8 +95,7 @@ def test_lattices_in_closed_form():
     Face-centred: C11 = kn + ks, C12 = (kn - ks) / 2, C44 = (kn + ks) / 2, over sqrt(2) R.
     """
     tensor = elastic_of(packs.simple_cubic(4, R), SPRINGS, periodic=ALL).tensor * 2 * R
-    expected = np.diag([3e6] * 3 + [0.5e6] * 3)
-    assert np.allclose(tensor, expected, rtol=0, atol=1e-6 * 3e6)
+    assert np.allclose(tensor, np.diag([3e6] * 3 + [0.5e6] * 3), rtol=0, atol=1e-6 * 3e6)
     tensor = elastic_of(packs.face_centred(3, R), SPRINGS, periodic=ALL).tensor * 2**0.5 * R
     assert tensor[[0, 0, 3], [0, 1, 3]] == pytest.approx([4e6, 1e6, 2e6], rel=1e-8)
     cement, area = Cement(radius_ratio=0.5, normal=8e13, shear=2e13), np.pi * (0.5 * R) ** 2
@@ -118,7 +107,7 @@ def test_lattices_in_closed_form():
 
 def test_plates_carry_a_column_as_its_springs_in_series():
     """Six grains and two plates are seven springs in series; the sides hang free of it."""
-    place = np.column_stack([(2 * np.arange(6) + 1) * R, np.full(6, R), np.full(6, R)])
+    place = np.array([[2 * n + 1, 1, 1] for n in range(6)]) * R
     box = np.array([[0, 12 * R], [0, 2 * R], [0, 2 * R]])
     smooth = PackMaterial(normal=3e6, shear=1e-3)
     tensor = elastic_of(resting(place, R, box), smooth, periodic=NONE).tensor
@@ -156,31 +145,23 @@ def test_rattlers_are_counted_and_a_layer_that_touches_nothing_is_refused_by_its
 
 
 # ---- Triaxial tests.
-def column():
-    """Four grains along x in a periodic box: a ring of contacts, free sideways."""
-    place = np.column_stack([(2 * np.arange(4) + 1) * R, np.full(4, 2 * R), np.full(4, 2 * R)])
-    return resting(place, R, np.array([[0, 8 * R], [0, 4 * R], [0, 4 * R]]))
-
-
-def strained(pack, material, strain):
-    loaded = loaded_pack(pack, replace(material, glued=False), ALL)
-    load = Load(strain=np.array([strain, 0, 0]), stress=np.zeros(3), drag=1e-3, within=1e-12)
-    motion, given, _ = balance(loaded, load)
-    return loaded, *carried_out(loaded, motion, given)
-
-
 def test_bonds_break_in_tension_and_shear_at_their_strength():
-    """A straight pull: stress = kn * (strain times length), whatever the area of the disc."""
+    """A straight pull of a ring of grains: stress = kn * (strain times length)."""
     strength = {"tensile_strength": 1e7, "shear_strength": 1e9}
     cement = Cement(radius_ratio=0.5, normal=1e14, shear=1e14, **strength)
     material = replace(SAND, cement=cement)
-    pack = at_rest(column(), material, ALL, relieved=True)
+    place = np.array([[2 * n + 1, 2, 2] for n in range(4)]) * R
+    box = np.array([[0, 8 * R], [0, 4 * R], [0, 4 * R]])
+    pack = loading.at_rest(resting(place, R, box), material, ALL, relieved=True)
     for share in (0.99, 1.01):
-        loaded, _, forces = strained(pack, material, share * 1e7 / (1e14 * 2 * R))
-        ratio, how = overloaded(loaded, forces)
+        strain = np.array([share * 1e7 / (1e14 * 2 * R), 0, 0])
+        loaded = loading.loaded_pack(pack, replace(material, glued=False), ALL)
+        load = loading.Load(strain=strain, stress=np.zeros(3), drag=1e-3, within=1e-12)
+        _, forces = loading.carried_out(loaded, *loading.balance(loaded, load)[:2])
+        ratio, how = loading.overloaded(loaded, forces)
         assert ratio.max() == pytest.approx(share, rel=1e-3)
-        assert how[np.argmax(ratio)] == TENSION
-    assert np.all(pack.memory.broken == SOUND)
+        assert how[np.argmax(ratio)] == loading.TENSION
+    assert np.all(pack.memory.broken == loading.SOUND)
     twist = np.zeros((len(loaded.joints), 6))
     twist[:, 3] = 1e-6
     tension, shear = bond_stress(twist, disc_radius(loaded.joints, material))

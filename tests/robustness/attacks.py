@@ -164,7 +164,7 @@ ATTACKS: Mapping[str, Attack] = {
     "kill": kill,
     "foreign": foreign,
     "garble": partial(damage, "garble"),
-    "file size": partial(limit, resource.RLIMIT_FSIZE, (0, 1000, 8_000, 30_000, 100_000)),
+    "file size": partial(limit, resource.RLIMIT_FSIZE, (1000, 8_000, 30_000, 100_000)),
     "race": race,
     **{how: partial(damage, how) for how in ("cut", "zero", "remove", "swap")},
     # with 4 handles Python does not start; below 200 MB the import of numpy ends the process

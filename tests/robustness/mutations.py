@@ -8,8 +8,6 @@ from typing import Any
 
 import tomli_w
 
-from fdnet.spheres.dump import COLUMNS
-
 Mutation = Callable[[Random, bytes], bytes]
 EDGE = 4.0
 """Edge of the box of the small packs."""
@@ -105,19 +103,6 @@ def change_geometry(rng: Random, data: bytes) -> bytes:
                 [*row[:4], rng.choice(("fine", "grain"))],
             )[change]
     return "\n".join([head, *(",".join(map(str, row)) for row in rows)]).encode()
-
-
-def small_dump(rng: Random, frames: int) -> bytes:
-    """A dump of eight spheres."""
-    text = ""
-    for step in range(frames):
-        text += f"ITEM: TIMESTEP\n{100 * step}\nITEM: NUMBER OF ATOMS\n8\n"
-        text += "ITEM: BOX BOUNDS ff ff ff\n-0.001 0.003\n0 0.0016\n0 0.0016\n"
-        text += f"ITEM: ATOMS {COLUMNS} \n"
-        for number in range(1, 9):
-            cells = " ".join(repr(rng.gauss(0, 1e-3)) for _ in range(7))
-            text += f"{number} 2 {cells} \n"
-    return text.encode()
 
 
 def small_pack(rng: Random, fines: int) -> bytes:

@@ -75,13 +75,16 @@ class Child(NamedTuple):
         return Ended(code, self.error.read_text(errors="replace"))
 
 
-def _limit(limits: Mapping[int, int]) -> None:
+Limits = Mapping[int, int]
+
+
+def _limit(limits: Limits) -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for what, most in limits.items():
         resource.setrlimit(what, (most, most))
 
 
-def _command(words: list[str], error: str, limits: Mapping[int, int]) -> None:
+def _command(words: list[str], error: str, limits: Limits) -> None:
     os.setsid()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     os.dup2(os.open(error, os.O_WRONLY | os.O_CREAT), 2)
@@ -90,22 +93,16 @@ def _command(words: list[str], error: str, limits: Mapping[int, int]) -> None:
     sys.exit(main(words))
 
 
-def start(
-    words: list[str], error: Path, *, fresh: bool = False, limits: Mapping[int, int] | None = None
-) -> Child:
+def start(words: list[str], error: Path, *, fresh=False, limits: Limits | None = None) -> Child:
     """`fdnet WORD ...` with limits of the system (RLIMIT_...: value).
 
     It is forked from a process that has loaded fdnet; `fresh` is a Python of its own.
     """
     if fresh:
-        own = subprocess.Popen(
-            [sys.executable, "-m", "fdnet.cli", *words],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=error.open("wb"),
-            start_new_session=True,
-            preexec_fn=lambda: _limit(limits or {}),
-        )
+        streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL}
+        streams |= {"stderr": error.open("wb"), "preexec_fn": lambda: _limit(limits or {})}
+        command = [sys.executable, "-m", "fdnet.cli", *words]
+        own = subprocess.Popen(command, start_new_session=True, **streams)
         return Child(own.pid, own.poll, error)
     folders = [str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
     os.environ["PYTHONPATH"] = os.pathsep.join(dict.fromkeys(":".join(folders).split(":")))

@@ -26,20 +26,19 @@ from fdnet.errors import DumpError
 from fdnet.spheres.dump import parse_dump
 from robustness import mutations
 from robustness.mutations import EDGE
+from tests.spheres.dumps import lattice_dump
 
 SEED, LIMIT_S = os.environ.get("FDNET_SEED", "1"), 20.0
 DECKS = {"in.pack", "pack.data", "in.invade", "ask.in", "fluid.in", "held.in", "checkpoint.in"}
 SMALL = "[box]\nsize_mm = [3.0, 1.6, 1.6]\n[grains]\nradius_mm = 0.25\ncount = 40\n"
-RICH = "[fines]\nradius_mm = [0.03, 0.05]\nslab_mm = 0.5\n[gravity]\nmode = 'on'\n[run]\n"
+RICH = "[fines]\nradius_mm = [0.03, 0.05]\nslab_mm = 0.5\n[gravity]\nmode = 'on'\n"
+RICH += "[run]\nduration_ms = 0.1\n"
 CASES = tuple(
     path.read_bytes()
     for path in sorted((Path(__file__).parents[2] / "cases").glob("*.toml"))
     if path.stem != "specimen1"
 )
-CASES += (
-    f"name = 'a'\n{SMALL}".encode(),
-    f"name = 'b'\n{SMALL}{RICH}duration_ms = 0.1\n".encode(),
-)
+CASES += (f"name = 'a'\n{SMALL}".encode(), f"name = 'b'\n{SMALL}{RICH}".encode())
 
 
 class TooLong(BaseException):
@@ -88,6 +87,10 @@ def judge_dump(data: bytes, _: Path, __: Random) -> str:
     return "accepted"
 
 
+OPTIONS = {"--units": "m mm um", "--axis": "x y z", "--periodic": "x yz xyz xyz"}
+OPTIONS |= {"--sections": "1 3 8", "--walls": "slip no-slip"}
+
+
 def judge_spheres(data: bytes, folder: Path, rng: Random) -> str:
     """`fdnet permeability`: strict JSON with possible numbers, or a refusal."""
     table = folder / "spheres.csv"
@@ -95,13 +98,7 @@ def judge_spheres(data: bytes, folder: Path, rng: Random) -> str:
     box = f"0,{EDGE},0,{EDGE},0,{EDGE}"
     box = rng.choice(("", f"0,{EDGE},0,0.5,0,{EDGE}", "0,1e-3,0,1e3,0,1", *[box] * 4))
     words = ["permeability", str(table), "--json", *(["--box", box] if box else [])]
-    for option, values in (
-        ("--units", "m mm um"),
-        ("--axis", "x y z"),
-        ("--periodic", "x yz xyz xyz"),
-        ("--sections", "1 3 8"),
-        ("--walls", "slip no-slip"),
-    ):
+    for option, values in OPTIONS.items():
         words += [option, rng.choice(values.split())]
     refused, out = answer(words + rng.choice(([], [], ["--law", "thesis"], ["--compare-laws"])))
     assert list(folder.iterdir()) == [table]
@@ -120,7 +117,8 @@ def judge_numbers(text: str) -> str:
     return "accepted" if result["k_initial_m2"] > 0 else "accepted, k = 0"
 
 
-DUMPS = tuple(mutations.small_dump(Random(frames), frames) for frames in (1, 2, 3))
+FRAMES = [lattice_dump(step=step) for step in range(3)]
+DUMPS = tuple("".join(FRAMES[:count]).encode() for count in (1, 2, 3))
 PACKS = tuple(mutations.small_pack(Random(number), number % 2 * 12) for number in range(4))
 KINDS = {
     "case bytes": (judge_case, CASES, mutations.change_bytes),
@@ -144,9 +142,7 @@ def outcomes(kind: str, number: int, folder: Path) -> Counter[str]:
     return seen
 
 
-def outcome(
-    judge, data: bytes, place: Path, rng: Random, name: str, limit: float = LIMIT_S
-) -> str:
+def outcome(judge, data: bytes, place: Path, rng: Random, name: str, limit=LIMIT_S) -> str:
     """What became of one input."""
 
     def stop(*_: object) -> None:
@@ -160,9 +156,8 @@ def outcome(
             warnings.simplefilter("error")
             return judge(data, place, rng)
     except (TooLong, Exception) as fault:
-        raise AssertionError(
-            f"{name}: {type(fault).__name__}: {fault}\n{data[:2000]!r}"
-        ) from fault
+        said = f"{name}: {type(fault).__name__}: {fault}\n{data[:2000]!r}"
+        raise AssertionError(said) from fault
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)

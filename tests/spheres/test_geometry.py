@@ -24,11 +24,8 @@ def test_overlap_counts_once():
 
 def test_walls_clip_and_periodic_sides_reach_round():
     corner, volume = snapshot([[0, 0, 0]], 0.8, BOX), 4 / 3 * np.pi * 0.8**3
-    for periodic, share, error in [
-        (NONE, 1 / 8, 2e-4),
-        (ALL, 1, 1e-4),
-        ((True, False, False), 1 / 4, 1e-4),
-    ]:
+    x_only = (True, False, False)
+    for periodic, share, error in [(NONE, 1 / 8, 2e-4), (ALL, 1, 1e-4), (x_only, 1 / 4, 1e-4)]:
         porosity = measure_porosity(corner, periodic=periodic).mean
         assert porosity == pytest.approx(1 - share * volume / 8, abs=error), periodic
     for radius in (0.3, 0.42, 0.48):  # nearly as wide as the period
@@ -50,9 +47,7 @@ def test_bins_of_one_sphere_are_its_spherical_segments_and_average_to_the_mean()
 
 
 def test_no_two_of_a_group_touch_and_groups_are_few():
-    """Lattices whose number of groups is known, or its bounds: the cliques of a face-centred
-    lattice have four spheres, and its spheres twelve contacts (exact contact counts here).
-    """
+    """At least the spheres of a clique, four in a face-centred lattice; at most contacts + 1."""
     corner, faces = [[0, 0, 0]], [[0, 0, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [0.5, 0.5, 0]]
     for name, cell, cells, radius, least, most in [
         ("apart", corner, 4, 0.49, 1, 1),

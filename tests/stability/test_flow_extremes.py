@@ -11,8 +11,7 @@ from fdnet.errors import FlowError
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.flow.sections import plane_pressures, whole_permeability
 from fdnet.network.laws.named import LAWS
-from fdnet.network.network import Network, build_network
-from fdnet.spheres.snapshot import Array
+from fdnet.network.network import build_network
 from tests.network.networks import chain
 from tests.network.packs import random_pack
 
@@ -23,33 +22,28 @@ def test_one_bad_conductance_among_many_is_refused_and_named():
             solve_flow(chain(9), np.array([1.0] * 7 + [bad, 1.0]))
 
 
-def pack_network() -> tuple[Network, Array]:
+def pack_network():
     network = build_network(random_pack(120), periodic=(False, True, True), walls="slip")
     return network, LAWS["lubrication"](network)
-
-
-def crossing(network: Network, plane: float) -> Array:
-    """True (T,) for throats with an end on either side of `plane`, or on it."""
-    x = network.throat_ends[:, :, 0]
-    return (x.min(axis=1) <= plane) & (x.max(axis=1) >= plane)
 
 
 def test_a_section_with_all_throats_blocked_leaves_k_0_there_and_k_elsewhere():
     network, g = pack_network()
     length = network.box[0, 1]
-    g = np.where(crossing(network, 0.5 * length), 0.0, g)
+    ends = network.throat_ends[:, :, 0]
+    across = (ends.min(axis=1) <= 0.5 * length) & (ends.max(axis=1) >= 0.5 * length)
+    g = np.where(across, 0.0, g)
     k, flow = whole_permeability(network, g)
     assert k == 0
     assert "no open path from x = 0 m" in flow.reason
-    assert flow.isolated_pores == np.sum(
-        (network.pore_position[:, 0] > 0) & (network.pore_position[:, 0] < length)
-    )
+    x = network.pore_position[:, 0]
+    assert flow.isolated_pores == np.sum((x > 0) & (x < length))
     assert solve_flow(network, g, span=(0.0, 0.2 * length)).inflow > 0
     assert solve_flow(network, g, span=(0.4 * length, 0.6 * length)).inflow == 0
 
 
 def test_sections_in_place_recombine_over_sixteen_decades():
-    """The drops of the planes' mean pressures add up to 1 and never rise along the flow."""
+    """The mean pressures of planes fall from 1 to 0 along the flow."""
     network, clean = pack_network()
     g = clean * 10.0 ** np.random.default_rng(5).uniform(-16, 0, len(clean))
     flow = solve_flow(network, g)
@@ -58,5 +52,4 @@ def test_sections_in_place_recombine_over_sixteen_decades():
     assert pressure[0] == 1.0
     assert pressure[-1] == 0.0
     assert np.all(np.diff(pressure) < 0)
-    assert flow.mass_balance is not None
     assert flow.mass_balance < 1e-6

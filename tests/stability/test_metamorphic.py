@@ -63,31 +63,23 @@ def mirrored(axis: int):
 def turned(pack: Pack) -> Pack:
     """The file's axes are named in another order, the flow is along what was x."""
     order = [2, 0, 1]
-    periodic = "".join(
-        new for new, old in zip("xyz", order, strict=True) if "xyz"[old] in pack.periodic
-    )
-    return replace(
-        pack, place=pack.place[:, order], box=pack.box[order], periodic=periodic, axis="y"
-    )
+    around = "".join("xyz"[new] for new in range(3) if "xyz"[order[new]] in pack.periodic)
+    place, box = pack.place[:, order], pack.box[order]
+    return replace(pack, place=place, box=box, periodic=around, axis="y")
 
 
 def doubled(pack: Pack) -> Pack:
     """Two periods along y."""
     step, box = np.array([0.0, np.ptp(pack.box[1]), 0.0]), pack.box.copy()
     box[1, 1] += step[1]
-    return replace(
-        pack,
-        place=np.vstack([pack.place, pack.place + step]),
-        radius=np.tile(pack.radius, 2),
-        kind=np.tile(pack.kind, 2),
-        box=box,
-    )
+    place = np.vstack([pack.place, pack.place + step])
+    radius, kind = np.tile(pack.radius, 2), np.tile(pack.kind, 2)
+    return replace(pack, place=place, radius=radius, kind=kind, box=box)
 
 
 def in_millimetres(pack: Pack) -> Pack:
-    return replace(
-        pack, place=1e3 * pack.place, radius=1e3 * pack.radius, box=1e3 * pack.box, unit="mm"
-    )
+    place, radius, box = 1e3 * pack.place, 1e3 * pack.radius, 1e3 * pack.box
+    return replace(pack, place=place, radius=radius, box=box, unit="mm")
 
 
 CHANGES = {
@@ -119,9 +111,8 @@ def permeability(pack: Pack, folder: Path, capsys, *options: str) -> tuple[float
 
 def spheres(spread: float, periodic: str) -> Pack:
     both = with_fines(random_pack(40, 0.55, spread=spread), 120, 0.12)
-    return Pack(
-        place=both.position, radius=both.radius, kind=both.kind, box=both.box, periodic=periodic
-    )
+    place, radius, kind, box = both.position, both.radius, both.kind, both.box
+    return Pack(place=place, radius=radius, kind=kind, box=box, periodic=periodic)
 
 
 @pytest.mark.parametrize("periodic", [pytest.param("xyz", marks=NIGHTLY), "yz", ""])
@@ -145,9 +136,8 @@ def test_another_description_of_the_same_pack_gives_its_permeability(tmp_path, c
 
 def test_without_tables_the_mirror_image_agrees_to_rounding(tmp_path, capsys):
     """The law of the thesis has closed forms only."""
-    pack = spheres(0.3, "yz")
-    values = [
-        permeability(one, tmp_path, capsys, "--law", "thesis")[0]
-        for one in (pack, mirrored(0)(pack), mirrored(1)(pack))
-    ]
-    assert values[1:] == pytest.approx([values[0]] * 2, rel=1e-12)
+    pack, law = spheres(0.3, "yz"), ("--law", "thesis")
+    whole, _ = permeability(pack, tmp_path, capsys, *law)
+    for axis in (0, 1):
+        image, _ = permeability(mirrored(axis)(pack), tmp_path, capsys, *law)
+        assert image == pytest.approx(whole, rel=1e-12)

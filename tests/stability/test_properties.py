@@ -15,37 +15,29 @@ from hypothesis import strategies as st
 
 from fdnet.case.file import case_from, set_keys
 from fdnet.case.tables import AnalysisChoices
-from fdnet.errors import CaseError, DumpError, FdnetError
+from fdnet.errors import CaseError, FdnetError
 from fdnet.network.permeability import analyse
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.dump import COLUMNS, parse_dump
-from fdnet.spheres.snapshot import Kind, Snapshot
 from tests.network.packs import random_pack, with_fines
 
 FIXED = settings(
     derandomize=True, deadline=None, database=None, suppress_health_check=list(HealthCheck)
 )
-SEEDS = st.integers(0, 2**31)
-LENGTHS = st.floats(0.01, 20.0)
 
 
 @st.composite
 def plausible(draw: st.DrawFn) -> dict[str, Any]:
     """Cases most of which are valid: the tiny one with numbers drawn over wide ranges."""
     data = copy.deepcopy(TINY)
-    radius = draw(LENGTHS)
+    radius = draw(st.floats(0.01, 20.0))
     sides = [radius * draw(st.floats(2.5, 8.0)) for _ in range(3)]
     data["box"] = {"size_mm": sides, "sides": draw(st.sampled_from(["walls", "periodic"]))}
     data["grains"] = {"radius_mm": radius, "porosity": draw(st.floats(0.2, 0.7))}
     data["grains"]["motion"] = draw(st.sampled_from(["fixed", "mobile"]))
-    data["fines"] = {
-        "radius_mm": radius * draw(st.floats(0.02, 0.5)),
-        "count": draw(st.integers(1, 1000)),
-    }
-    data["fluid"] = {
-        "viscosity_cP": 10.0 ** draw(st.floats(-2, 5)),
-        "overbalance_MPa": 10.0 ** draw(st.floats(-4, 2)),
-    }
+    small, count = radius * draw(st.floats(0.02, 0.5)), draw(st.integers(1, 1000))
+    data["fines"] = {"radius_mm": small, "count": count}
+    viscosity, pressure = 10.0 ** draw(st.floats(-2, 5)), 10.0 ** draw(st.floats(-4, 2))
+    data["fluid"] = {"viscosity_cP": viscosity, "overbalance_MPa": pressure}
     data["run"] = {"stiffness_N_m": 10.0 ** draw(st.floats(1, 11))}
     return data
 
@@ -88,18 +80,8 @@ def test_any_assignment_is_taken_or_refused(text):
         tomli_w.dumps(case.data())
 
 
-def analysed(
-    grains: Snapshot,
-    damaged: Snapshot | None,
-    periodic: tuple[bool, bool, bool],
-    sections: int = 3,
-) -> Any:
-    options = AnalysisChoices.of_pack(sections=sections, walls="slip")
-    return analyse(grains, damaged, periodic=periodic, options=options)
-
-
 @given(
-    seed=SEEDS,
+    seed=st.integers(0, 2**31),
     count=st.integers(20, 40),
     solid=st.floats(0.2, 0.65),
     spread=st.sampled_from([0.0, 0.3, 0.6]),
@@ -108,73 +90,18 @@ def analysed(
 )
 @settings(FIXED, max_examples=25)
 def test_random_packs_keep_every_promise(seed, count, solid, spread, fines, around):
-    """k is finite and not negative, fines never raise it, fluxes balance.
-
-    Sections in place recombine in series.
-    """
+    """Fines never raise k, fluxes balance, and sections in place recombine in series."""
     grains = random_pack.__wrapped__(count, solid, seed=seed, spread=spread, periodic=True)
     both = with_fines(grains, fines, 0.1, seed=seed % 1000) if fines else None
-    analysis = analysed(grains, both, around)
+    options = AnalysisChoices.of_pack(sections=3, walls="slip")
+    analysis = analyse(grains, both, periodic=around, options=options)
     assert 0 <= analysis.k_damaged <= analysis.k_initial * (1 + 1e-12) < np.inf
     assert 0 <= analysis.porosity_damaged <= analysis.porosity_initial <= 1
-    for flow, k in (
-        (analysis.flow_initial, analysis.k_initial),
-        (analysis.flow_damaged, analysis.k_damaged),
-    ):
-        assert (k > 0) == (not flow.reason)
+    for state in ("initial", "damaged"):
+        flow, whole = getattr(analysis, f"flow_{state}"), getattr(analysis, f"k_{state}")
+        assert (whole > 0) == (not flow.reason)
         assert flow.residual <= 1e-6
-        assert k == 0 or flow.mass_balance <= 1e-6
-    for name in ("k_initial", "k_damaged"):
-        parts = [getattr(section, f"{name}_inplace") for section in analysis.sections]
-        whole = getattr(analysis, name)
+        assert whole == 0 or flow.mass_balance <= 1e-6
+        parts = [getattr(section, f"k_{state}_inplace") for section in analysis.sections]
         series = len(parts) / sum(1 / part for part in parts) if all(parts) else 0.0
         assert series == pytest.approx(whole, rel=1e-6)
-
-
-FINITE = st.floats(allow_nan=False, allow_infinity=False)
-
-
-@st.composite
-def frames(draw: st.DrawFn) -> tuple[bytes, list[np.ndarray]]:
-    """Bytes of one to three frames as LIGGGHTS writes them, and their rows by id."""
-    text, tables = "", []
-    for step in range(draw(st.integers(1, 3))):
-        ids = draw(st.lists(st.integers(1, 10**6), min_size=0, max_size=5, unique=True))
-        rows = [
-            [one, draw(st.sampled_from(list(Kind))), *(draw(FINITE) for _ in range(7))]
-            for one in ids
-        ]
-        head = f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{len(rows)}\n"
-        head += "ITEM: BOX BOUNDS ff pp pp\n"
-        head += f"-1 1\n0 0.5\n-3e-3 0\nITEM: ATOMS {COLUMNS} \n"
-        text += head + "".join(
-            f"{r[0]} {int(r[1])} " + " ".join(f"{v:.17g}" for v in r[2:]) + " \n" for r in rows
-        )
-        tables.append(np.array(sorted(rows), float).reshape(-1, 9))
-    return text.encode(), tables
-
-
-@given(frames())
-@settings(FIXED, max_examples=100)
-def test_a_written_dump_is_read_back_to_the_last_bit(written):
-    data, tables = written
-    read = list(parse_dump(data, "d"))
-    assert [frame.step for frame in read] == list(range(len(tables)))
-    assert all(
-        np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=True)
-    )
-
-
-@given(frames(), st.floats(0, 1, exclude_max=True))
-@settings(FIXED, max_examples=150)
-def test_a_dump_cut_anywhere_is_refused_or_ends_between_two_frames(written, share):
-    data, tables = written
-    cut = data[: 1 + int(share * (len(data) - 1))]
-    try:
-        read = list(parse_dump(cut, "d"))
-    except DumpError:
-        return
-    assert cut == data or data[len(cut) :].startswith(b"ITEM: TIMESTEP")
-    assert all(
-        np.array_equal(frame.rows, table) for frame, table in zip(read, tables, strict=False)
-    )
