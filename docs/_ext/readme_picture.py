@@ -60,9 +60,7 @@ def draw_permeability(axes: Any, sections: pd.DataFrame) -> None:
         place = (row.x_lo_m + row.x_hi_m) / 2 * MM
         axes.annotate(text, (place, low), (0, -14), textcoords="offset points", ha="center")
     axes.set(
-        ylim=(0, None),
-        xlabel="depth from the formation face (mm)",
-        ylabel="permeability (mD)",
+        ylim=(0, None), xlabel="depth from the formation face (mm)", ylabel="permeability (mD)"
     )
     axes.yaxis.set_major_formatter("{x:,.0f}")
     axes.legend(loc="lower right", frameon=False)

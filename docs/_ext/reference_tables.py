@@ -19,8 +19,7 @@ from fdnet.errors import PAGE, catalogue
 
 PAGES = ("docs/reference/case.md", "docs/reference/commands.md")
 BLOCK = re.compile(
-    r"(<!-- (case-keys|command-options|shared-options)(?: ([\w.]+))? -->\n).*?(<!-- end -->)",
-    re.S,
+    r"(<!-- (case-keys|command-options|shared-options)(?: ([\w.]+))? -->\n).*?(<!-- end -->)", re.S
 )
 
 

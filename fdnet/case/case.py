@@ -20,13 +20,20 @@ from fdnet.case.spheres import Fines, Grains, Spheres
 from fdnet.errors import CaseError
 from fdnet.names import LIGGGHTS_STAGES, STAGES, Stage
 
-POLICIES = ("max_hours", "max_overlap", "on_overlap")
+POLICIES = ("max_hours", "max_overlap")
 """Keys of [run] that decide whether a run may go on, not what it computes."""
 KEYS = (
     *("name", "seed", "box", "grains", "fines", "fluid", "well", "drag", "gravity", "contact"),
     *("invasion", "cake", "clean_up", "bonds", "run", "analysis"),
 )
 """Keys at the top of a case file, in the order in which they are written."""
+
+
+def without_old_keys(data: dict[str, Any]) -> dict[str, Any]:
+    """The tables of a recorded case without the keys, of no result, that only older runs have."""
+    data.pop("given", None)  # texts for the same values
+    data.get("run", {}).pop("on_overlap", None)
+    return data
 
 
 class Case(tables.Part):
@@ -152,8 +159,7 @@ class Case(tables.Part):
     def same_specimen(self, text: bytes) -> bool:
         """Whether a case.toml as `toml` wrote it is this case but for `POLICIES`."""
         try:
-            data = tomllib.loads(text.decode())
-            data.pop("given", None)  # as runs of before have it
+            data = without_old_keys(tomllib.loads(text.decode()))
             return case_type(data).model_validate(data).digest() == self.digest()
         except ValueError:
             return False

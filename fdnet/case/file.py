@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, get_args
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from fdnet.case.case import Case, InvasionCase, case_type, cross_problems
+from fdnet.case.case import Case, InvasionCase, case_type, cross_problems, without_old_keys
 from fdnet.case.spheres import Sizes
 from fdnet.case.tables import Part
 from fdnet.case.units import SUFFIXES, converted, length_factor, share_of, stem_of, suffix_of
@@ -525,9 +525,7 @@ def read_case(
 
 def recorded_case(path: Path) -> Case:
     """The case that a run folder holds. Raises CaseError as `read_case` does."""
-    data = toml_tables(path)
-    data.pop("given", None)  # texts for the same values, in runs of before
-    return case_from(data, source=str(path))
+    return case_from(without_old_keys(toml_tables(path)), source=str(path))
 
 
 def toml_tables(path: str | Path, what: str = "a case file") -> dict[str, Any]:

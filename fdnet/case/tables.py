@@ -22,18 +22,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from fdnet import names
 from fdnet.errors import CaseError
-from fdnet.names import (
-    ALL_SPHERES,
-    AUTO,
-    DEFAULT_LAW,
-    MOST_SECTIONS,
-    MOST_SPHERES,
-    REMOVED_LAWS,
-    DamageLawName,
-    LawName,
-    WallName,
-)
 
 MAX_CONCENTRATION = 0.30
 """Random sequential addition of spheres saturates near 0.38 (Torquato, Uche & Stillinger 2006)."""
@@ -316,9 +306,7 @@ class Run(Part):
     max_hours: Positive = 24.0
     """A case that is expected to run longer is refused."""
     max_overlap: Fraction = 0.05
-    """Overlap of a fine, over the smaller diameter, above which `on_overlap` applies."""
-    on_overlap: Literal["warn", "stop"] = "warn"
-    """Then the run warns, or stops with its state kept ("stop")."""
+    """Overlap of a fine, over the smaller diameter, above which the run warns."""
     time_step_factor: Annotated[float, Field(gt=0, le=CONTACT_STEP_LIMIT)] | None = None
     """Time step over sqrt(m/k) of the lightest sphere and stiffest contact; above 0.2 for linear
     contacts without rolling friction and with damping ratios up to 0.48 alone. When absent: 0.2;
@@ -403,7 +391,7 @@ def _count_or_edges(value: Any) -> str:
 
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-Count = Annotated[int, Field(ge=1, le=MOST_SECTIONS), Tag("[count]")]
+Count = Annotated[int, Field(ge=1, le=names.MOST_SECTIONS), Tag("[count]")]
 Edges = Annotated[tuple[Finite, ...], Tag("[edges]")]
 Sections = Annotated[Count | Edges, Discriminator(_count_or_edges)]
 
@@ -426,13 +414,13 @@ class AnalysisChoices(Part):
 
     sections: Sections = 8
     """Number of equal slabs along the flow; in Python also their edges, m."""
-    law: LawName = DEFAULT_LAW
+    law: names.LawName = names.DEFAULT_LAW
     """Conductance of a clean throat."""
-    damage_law: DamageLawName = Field(
-        AUTO,
+    damage_law: names.DamageLawName = Field(
+        names.AUTO,
         description='How fines lower the permeability: "all-spheres", the network of grains and '
         'fines, or a law that damages the throats of the grains. "auto": "all-spheres" up to '
-        f'{MOST_SPHERES:,} spheres, "section-archie" above.',
+        f'{names.MOST_SPHERES:,} spheres, "section-archie" above.',
     )
     clogging_threshold: Fraction | None = None
     """Throat porosity below which the thesis's laws close a throat. When absent: 0.40 ("thesis")
@@ -444,21 +432,21 @@ class AnalysisChoices(Part):
     """Volume of a fine in a throat: exact, or by the thesis's two planes."""
     profile_bin_mm: Positive | None = 0.25
     """Width of the bins of `profile.csv`."""
-    walls: WallName = "no-slip"
+    walls: names.WallName = "no-slip"
     """Whether side walls hold the fluid; the thesis's laws do not know it."""
 
     @field_validator("law", "damage_law", mode="before")
     @classmethod
     def _is_there(cls, name: Any) -> Any:
-        return still_there(name, REMOVED_LAWS)
+        return still_there(name, names.REMOVED_LAWS)
 
     def refusals(self) -> Iterator[str]:
         """Why laws do not go together, one sentence each."""
-        if self.damage_law == ALL_SPHERES and self.law != DEFAULT_LAW:
+        if self.damage_law == names.ALL_SPHERES and self.law != names.DEFAULT_LAW:
             yield (
                 f"analysis.damage_law: {self.damage_law!r} needs a network of all spheres, whose "
-                f"law is {DEFAULT_LAW!r}, analysis.law is {self.law!r}; take analysis.law = "
-                f"{DEFAULT_LAW!r}, or another damage law"
+                f"law is {names.DEFAULT_LAW!r}, analysis.law is {self.law!r}; take analysis.law = "
+                f"{names.DEFAULT_LAW!r}, or another damage law"
             )
 
     profile_bin_m: ClassVar = InSI[float | None]("profile_bin_mm", 1e-3)

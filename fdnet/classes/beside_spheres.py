@@ -113,7 +113,7 @@ class FinerClasses:
                 rate = passed.velocity * sieve.area
                 drop = bed.viscosity * rate / streams.inflow
                 solids = released(sieve, solids, streams, drop, step / rate, self.release)
-            _, after = advanced(sieve, solids, classes, streams, what, step)
+            after = advanced(sieve, solids, classes, streams, what, step)
             self.solids = Deposits(
                 **{one.name: getattr(after, one.name)[..., :-1] for one in fields(Deposits)}
             )

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fdnet.case.spheres import Fines
+from fdnet.network.compiled import loops_inside
 from fdnet.spheres.snapshot import Array, one_line
 
 BOLTZMANN, GRAVITY = 1.380649e-23, 9.81
@@ -87,13 +88,18 @@ BRIDGED = ((0.65, 0.0), (0.725, 0.03), (0.9, 0.07))
 """Chance per arrival that an empty throat stops a fine, by diameter over passage."""
 
 
-def bridging_chance(ratio: Array) -> Array:
+@loops_inside
+def bridging_chance(ratio: float) -> float:
     """Chance per arrival that an empty throat stops a fine narrower than it, by d over passage.
 
     0 from 1 on, where `wider_share` holds all.
     """
-    at, chance = zip(*BRIDGED, strict=True)
-    return np.where(ratio < 1.0, np.interp(ratio, at, chance), 0.0)
+    (none, _), (low, few), (high, most) = BRIDGED
+    if ratio <= none or ratio >= 1.0:
+        return 0.0
+    if ratio < low:
+        return few * (ratio - none) / (low - none)
+    return few + (most - few) * min((ratio - low) / (high - low), 1.0)
 
 
 # ---- Attachment to the surface of grains.
@@ -146,6 +152,6 @@ def covered(deposit: Array, classes: SizeClasses, surface: Array) -> Array:
 
     A fine covers its own section, 3 / (2 d) for each volume (Johnson and Elimelech 1995).
     """
-    section = deposit @ (1.5 / classes.diameter)
+    section = np.einsum("nc,c->n", deposit, 1.5 / classes.diameter)
     full = JAMMED * np.where(surface > 0, surface, math.inf)
     return np.minimum(section / full, 1.0)

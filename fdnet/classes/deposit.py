@@ -6,13 +6,15 @@ behind whatever is wider than the gaps of its bed, and so does the cake, which i
 pores of the face turn away.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from fdnet.classes.capture import TIGHT, SizeClasses, bridging_chance, covered, wider_share
-from fdnet.classes.transport import Streams, Swept, carry
+from fdnet.classes.transport import Streams, carry
+from fdnet.network.compiled import loops_in_place
 from fdnet.network.flow.flow import PLANE_TOLERANCE
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, frozen, one_line
@@ -142,14 +144,23 @@ def loads_of(
 
     What sticks to the grains is no pile that stops others, but narrows the pore all the same.
     """
-    count, half = len(sieve.void), 0.5 * solids.in_throats
-    held = solids.in_pores + solids.attached if with_attached else solids.in_pores
-    held = held + sum(_gathered(ends, half, count) for ends in sieve.ends.T)
-    size = bed_diameter(held, classes)
-    share = np.divide(held.sum(axis=1), sieve.void, out=np.zeros(count), where=sieve.void > 0)
+    count, half = len(sieve.void), 0.5 * _sums(solids.in_throats, classes)
+    held = _sums(solids.in_pores, classes)
+    if with_attached:
+        held += _sums(solids.attached, classes)
+    held += sum(_gathered(ends, half, count) for ends in sieve.ends.T)
+    volume, inverse = held.T
+    size = np.divide(volume, inverse, out=np.zeros(count), where=inverse > 0)
+    share = np.divide(volume, sieve.void, out=np.zeros(count), where=sieve.void > 0)
     wide = np.divide(size, sieve.room, out=np.zeros(count), where=sieve.room > 0)
     full = (1.0 - PACKED) * np.maximum(1.0 - LOOSE * wide, 0.25)
     return Loads(share=share, filled=share / full, diameter=size)
+
+
+def _sums(deposit: Array, classes: SizeClasses) -> Array:
+    """Of solids (M, C) m3 the volume, and that of each class over its diameter, (M, 2)."""
+    parts = np.column_stack([np.ones(len(classes.diameter)), 1.0 / classes.diameter])
+    return np.einsum("mc,cp->mp", deposit, parts)  # not by BLAS, whose threads wait for each other
 
 
 def _gathered(where: Array, values: Array, count: int) -> Array:
@@ -188,6 +199,8 @@ def bed_holds(size: Array, classes: SizeClasses) -> Array:
 LOADED = (0.06, 1.6, 0.33)
 """Chance per arrival that a deposit beside a throat stops a fine: a + b s, at most c, of the share
 s that it takes of the two pores."""
+NONE = 1e-3
+"""Share of two pores below which a deposit stops nothing: less than a fine in hundreds of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -195,8 +208,8 @@ class Holding:
     """What links (K) and the face hold back in one step."""
 
     held: Array  # (K, C) share of each class that a link holds back
-    stuck: Array  # (K, C) the part of it that sticks to grains, as a share of all
-    admitted: Array  # (N, C) share of the mud's solids that enter a pore of the face
+    stuck: Array  # (K, C) the part of it that sticks to grains, as a share of all; (0, C): none
+    feed: Array  # (N, C) volume over that of the fluid that enters a pore of the face
 
     __repr__ = one_line
 
@@ -206,36 +219,68 @@ def holding(
 ) -> Holding:
     """What holds back what, with the deposit as it is; `filtering` (C,) 1/m is of clean grains."""
     loads, throat = loads_of(sieve, solids, classes), streams.link
-    holds = bed_holds(loads.diameter, classes)
     # 0 up to a filled share of FULL, 1 in a full pore
-    full = np.clip((loads.filled - FULL) / (1.0 - FULL), 0.0, 1.0)[:, None] * holds
+    full = np.clip((loads.filled - FULL) / (1.0 - FULL), 0.0, 1.0)
     one, other = streams.source, streams.target
     void = np.maximum(sieve.void, 1e-30)
     near = (loads.share * void)[one] + (loads.share * void)[other]
     near /= void[one] + void[other]
     start, slope, most = LOADED
     chance = np.where(near > 0, np.minimum(start * (near > NONE) + slope * near, most), 0.0)
-    beside = chance[:, None] * np.maximum(holds[one], holds[other])
     clean = np.maximum(sieve.passage[throat], 1e-12)
-    bridged = bridging_chance(classes.diameter / clean[:, None])
-    passing = (1.0 - wider_share(classes, clean)) * (1.0 - bridged) * (1.0 - beside)
-    passing *= 1.0 - full[other]
-    stuck = np.zeros_like(passing)
+    held = np.empty((len(throat), len(classes.diameter)))
+    stuck, way = held[:0], np.zeros(0)
     if np.any(filtering > 0):
         bare = 1.0 - covered(solids.attached, classes, sieve.surface)[one]
-        stuck = -np.expm1(-filtering * (sieve.reach[throat] / sieve.winding * bare)[:, None])
-    held = 1.0 - (1.0 - stuck) * passing
-    return Holding(held=held, stuck=stuck, admitted=_admitted(sieve, solids, classes, full))
-
-
-NONE = 1e-3
-"""Share of two pores below which a deposit stops nothing: less than a fine in hundreds of them."""
-
-
-def _admitted(sieve: Sieve, solids: Deposits, classes: SizeClasses, full: Array) -> Array:
-    size, own = (bed_diameter(one, classes) for one in (solids.cake[None], solids.cake))
+        stuck, way = np.empty_like(held), sieve.reach[throat] / sieve.winding * bare
+    with np.errstate(divide="ignore"):
+        gap = np.log(TIGHT * loads.diameter)
+    gap[loads.diameter <= 0] = np.inf
+    low, high = np.log(classes.low), np.log(classes.high)
+    _shares(
+        *(one, other, clean, np.log(clean), chance, full, gap, way, filtering),
+        *(classes.diameter, high, np.maximum(high - low, 1e-12), held, stuck),
+    )
+    feed, face = np.zeros((len(void), len(classes.diameter))), np.flatnonzero(streams.fed)
+    size, own = (bed_diameter(cake, classes) for cake in (solids.cake[None], solids.cake))
     layers = thickness_of_cake(sieve, solids) / float(own) if own > 0 else 0.0
-    return (1.0 - full) * (1.0 - min(1.0, layers) * bed_holds(size, classes))
+    admitted = 1.0 - full[face, None] * bed_holds(loads.diameter[face], classes)
+    admitted *= 1.0 - min(1.0, layers) * bed_holds(size, classes)
+    feed[face] = admitted * classes.concentration
+    return Holding(held=held, stuck=stuck, feed=feed)
+
+
+@loops_in_place
+def _shares(
+    source: Array,
+    target: Array,
+    clean: Array,
+    passage: Array,
+    chance: Array,
+    full: Array,
+    gap: Array,
+    way: Array,
+    filtering: Array,
+    diameter: Array,
+    high: Array,
+    width: Array,
+    held: Array,
+    stuck: Array,
+) -> None:
+    """Sets `held` and `stuck` (K, C); `passage` (K,), `gap` (N,) and `high` (C,) are logarithms,
+    `width` (C,) is that of a class."""
+    for k in range(len(source)):
+        before, behind = gap[source[k]], gap[target[k]]
+        for i in range(len(diameter)):
+            wide = min(max((high[i] - passage[k]) / width[i], 0.0), 1.0)
+            beside = min(max((high[i] - min(before, behind)) / width[i], 0.0), 1.0)
+            bed = min(max((high[i] - behind) / width[i], 0.0), 1.0)
+            passing = (1.0 - wide) * (1.0 - bridging_chance(diameter[i] / clean[k]))
+            passing *= (1.0 - chance[k] * beside) * (1.0 - full[target[k]] * bed)
+            if len(stuck):
+                stuck[k, i] = -math.expm1(-filtering[i] * way[k])
+                passing *= 1.0 - stuck[k, i]
+            held[k, i] = 1.0 - passing
 
 
 def thickness_of_cake(sieve: Sieve, solids: Deposits) -> float:
@@ -250,48 +295,67 @@ def advanced(
     streams: Streams,
     what: Holding,
     filtrate: float,
-) -> tuple[Swept, Deposits]:
-    """What the flow carried while `filtrate` m3 of fluid entered, and the solids after it.
+) -> Deposits:
+    """The solids after `filtrate` m3 of fluid entered, of which `what` says what was held back.
 
-    `what` says what holds back. What was held goes to throats, pores and grains.
+    What was held goes to throats, pores and grains.
     """
-    void = fluid_void(sieve, solids)
-    carried = carry(
-        streams,
-        filtrate,
-        void=void,
-        inside=solids.carried,
-        feed=classes.concentration * what.admitted,
-        holds=what.held,
+    void, face = fluid_void(sieve, solids), np.flatnonzero(streams.fed)
+    carried, held, passed = carry(
+        streams, filtrate, void=void, inside=solids.carried, feed=what.feed, holds=what.held
     )
-    count = len(sieve.void)
-    sticks = np.divide(what.stuck, what.held, out=np.zeros_like(what.held), where=what.held > 0)
-    stuck = carried.held * np.minimum(sticks, 1.0)  # not above it by rounding
-    rest = carried.held - stuck
-    wedged = np.minimum(solids.in_throats @ (1.0 / classes.volume), 1.0)
-    room = 1.0 - wedged[streams.link]
-    in_pores, attached = solids.in_pores.copy(), solids.attached.copy()
-    in_throats, volume = solids.in_throats.copy(), classes.volume
-    passage = sieve.passage[streams.link]
-    for i in reversed(range(len(volume))):
-        fits = classes.diameter[i] <= WEDGES * passage
-        wedges = np.where(fits, np.minimum(rest[:, i], room * volume[i]), 0.0)
-        room = np.maximum(room - wedges / volume[i], 0.0)
-        in_throats[streams.link, i] += wedges
-        in_pores[:, i] += np.bincount(streams.source, rest[:, i] - wedges, count)
-        attached[:, i] += np.bincount(streams.source, stuck[:, i], count)
-    come = filtrate * streams.fed[:, None] * classes.concentration
-    after = replace(
+    carried *= void[:, None]
+    in_pores, in_throats = solids.in_pores.copy(), solids.in_throats.copy()
+    attached = solids.attached.copy() if len(what.stuck) else solids.attached
+    _settle(
+        *(streams.source, streams.link, held, what.held, what.stuck, sieve.passage),
+        *(classes.diameter, classes.volume, in_pores, attached, in_throats),
+    )
+    entered, come = filtrate * streams.fed[face, None], classes.concentration
+    return replace(
         solids,
-        carried=carried.concentration * void[:, None],
+        carried=carried,
         in_pores=in_pores,
         attached=attached,
         in_throats=in_throats,
-        cake=solids.cake + np.sum(come * (1.0 - what.admitted), axis=0),
-        passed=solids.passed + carried.passed,
-        supplied=solids.supplied + come.sum(axis=0),
+        cake=solids.cake + np.sum(entered * (come - what.feed[face]), axis=0),
+        passed=solids.passed + passed,
+        supplied=solids.supplied + np.sum(entered * come, axis=0),
     )
-    return carried, after
+
+
+@loops_in_place
+def _settle(
+    source: Array,
+    link: Array,
+    held: Array,
+    share: Array,
+    stuck: Array,
+    passage: Array,
+    diameter: Array,
+    volume: Array,
+    in_pores: Array,
+    attached: Array,
+    in_throats: Array,
+) -> None:
+    """Adds `held` (K, C) m3 to the solids, wide ones first: a throat has room for one fine."""
+    for k in range(len(source)):
+        pore, throat, taken = source[k], link[k], 0.0
+        for i in range(len(volume)):
+            taken += in_throats[throat, i] / volume[i]
+        room = 1.0 - min(taken, 1.0)
+        for i in range(len(volume) - 1, -1, -1):
+            rest = held[k, i]
+            if len(stuck) and share[k, i] > 0.0:
+                sticks = rest * min(stuck[k, i] / share[k, i], 1.0)  # not above it by rounding
+                attached[pore, i] += sticks
+                rest -= sticks
+            if diameter[i] <= WEDGES * passage[throat]:
+                wedged = min(rest, room * volume[i])
+                room = max(room - wedged / volume[i], 0.0)
+                in_throats[throat, i] += wedged
+                rest -= wedged
+            in_pores[pore, i] += rest
 
 
 # ---- Release: the flow lifts what sticks where it pulls at the wall hard enough.
@@ -337,6 +401,6 @@ LEAST_VOID = 1e-3
 
 def fluid_void(sieve: Sieve, solids: Deposits) -> Array:
     """Void (N,) m3 that the solids leave to the fluid."""
-    taken = (solids.in_pores + solids.attached).sum(axis=1)
+    taken = solids.in_pores.sum(axis=1) + solids.attached.sum(axis=1)
     least = LEAST_VOID * np.maximum(sieve.void, 1e-6 * sieve.void.mean())
     return np.maximum(sieve.void - taken, least)

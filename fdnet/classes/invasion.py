@@ -50,17 +50,17 @@ class PackState(NamedTuple):
     flow: Flow
 
 
-def flows_through(network: Network, sieve: Sieve, clean: Array) -> "PackStateOf":
+def flows_through(network: Network, sieve: Sieve, clean: Array, intact: Flow) -> "PackStateOf":
     """How the fluid flows through a network when the sides of its throats keep some of `clean`.
 
-    `clean` (T,) m3 are the conductances without solids. Raises FlowError as `solve_flow` does.
+    `clean` (T,) m3 are the conductances without solids, `intact` is the flow by them. Raises FlowError as `solve_flow` does.
     """
     first = np.unique(network.pore_group, return_index=True)[1]
-    whole, intact = sieve.halves.sum(axis=1), solve_flow(network, clean).inflow
+    whole = sieve.halves.sum(axis=1)
 
-    def state(kept: Array) -> PackState:
+    def state(kept: Array, near: Flow | None) -> PackState:
         conductance = clean * ratio(whole, np.sum(sieve.halves / kept, axis=1))
-        flow = solve_flow(network, conductance)
+        flow = solve_flow(network, conductance, near=near or intact)
         streams = streams_of(
             sieve.ends,
             flow.throat_flux,
@@ -72,15 +72,16 @@ def flows_through(network: Network, sieve: Sieve, clean: Array) -> "PackStateOf"
         return PackState(
             streams=streams,
             energy=spent / max(float(spent.sum()), 1e-300),
-            k_over_k0=flow.inflow / intact if intact > 0 else 0.0,
+            k_over_k0=flow.inflow / intact.inflow if intact.inflow > 0 else 0.0,
             flow=flow,
         )
 
     return state
 
 
-PackStateOf = Callable[[Array], PackState]
-"""The flow, from the share (T, 2) of its conductance that each side of a throat keeps."""
+PackStateOf = Callable[[Array, Flow | None], PackState]
+"""The flow, from the share (T, 2) of its conductance that each side of a throat keeps, and a flow
+near it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,15 +167,33 @@ def invade_classes(
     solids, pores = no_solids(sieve, classes), float(sieve.void.sum())
     kept, rows, by_class, time, filtrate = np.ones(sieve.ends.shape), [], [], 0.0, 0.0
     wanted, quiet, reason, mud = FIRST_STEP * pores, 0.0, "", float(classes.concentration.sum())
-    state = flow_with(kept)
+    state = flow_with(kept, None)
     for _ in range(MOST_STEPS):
         cake = cake_resistance(course.cake_permeability, sieve, solids, classes)
         velocity = course.velocity
         if not course.at_rate:
             more = cake / course.resistance
             velocity = velocity_in(velocity, course.rest, state.k_over_k0, more)
-        rows.append(_row(course, sieve, solids, time, filtrate, velocity, state.k_over_k0, cake))
         by_class.append([solids.inside_by_class, solids.passed, solids.cake])
+        supplied = float(solids.supplied.sum())
+        viscosity, inside, passed, before = course.bed.viscosity, *np.sum(by_class[-1], axis=1)
+        drop = viscosity * velocity * course.resistance / max(state.k_over_k0, 1e-300)
+        rows.append(
+            {
+                "time_s": time,
+                "rate_m3_s": velocity * sieve.area,
+                "rate_over_initial": velocity / course.velocity,
+                "k_over_k0": state.k_over_k0,
+                "filtrate_m3": filtrate,
+                "supplied_m3": supplied,
+                "invaded_m3": float(inside),
+                "passed_m3": float(passed),
+                "cake_m3": float(before),
+                "cake_thickness_m": thickness_of_cake(sieve, solids),
+                "pressure_cake_Pa": viscosity * velocity * cake,
+                "pressure_pack_Pa": drop,
+            }
+        )
         reason = reason or ("plugged" if velocity <= 0 else "")
         if reason:
             break
@@ -182,31 +201,30 @@ def invade_classes(
         filtering = filter_coefficient(classes, bed, course.sticking)
         what = holding(sieve, solids, classes, state.streams, filtering)
         rate, bounds = velocity * sieve.area, []
-        bounds.append((course.supply - float(solids.supplied.sum())) / mud)
+        bounds.append((course.supply - supplied) / mud)
         bounds.append(((course.duration or course.cap_time) - time) * rate)
         if course.duration is None:
             bounds.append(0.25 * course.plug_time * rate)
         volume = min(wanted, *bounds)
-        drop = course.bed.viscosity * velocity * course.resistance / state.k_over_k0
         while True:
             loose = solids
             if course.release:
                 law, streams = course.release, state.streams
                 loose = released(sieve, solids, streams, drop, volume / rate, law)
-            _, after = advanced(sieve, loose, classes, state.streams, what, volume)
+            after = advanced(sieve, loose, classes, state.streams, what, volume)
             new = kept_shares(sieve, after, classes)
             change = _change(sieve, state.energy, kept, new)
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
                 break
             volume *= max(0.2, CHANGE / change)
         wanted = volume * min(max(CHANGE / max(change, 1e-9), 0.3), 2.0)
-        come = volume * float(np.sum(state.streams.fed[:, None] * classes.concentration))
+        come = volume * mud * float(state.streams.fed.sum())
         entered = come - float(np.sum(after.cake - solids.cake))
         time, filtrate = time + volume / rate, filtrate + volume
         crossing = entered / (mud * volume) * velocity / course.velocity
         quiet = quiet + volume / rate if crossing <= course.plug_rate else 0.0
         solids, kept = after, new
-        state = flow_with(kept)
+        state = flow_with(kept, state.flow)
         reason = _ended(course, time, quiet, float(solids.supplied.sum()))
     return ClassInvasion(
         solids=solids,
@@ -234,34 +252,6 @@ def _ended(course: Course, time: float, quiet: float, supplied: float) -> str:
     if supplied >= near * course.supply:
         return "supply_exhausted"
     return "cap" if time >= near * course.cap_time else ""
-
-
-def _row(
-    course: Course,
-    sieve: Sieve,
-    solids: Deposits,
-    time: float,
-    filtrate: float,
-    velocity: float,
-    k_over_k0: float,
-    cake: float,
-) -> dict[str, float]:
-    inside = float(solids.inside_by_class.sum())
-    viscosity = course.bed.viscosity
-    return {
-        "time_s": time,
-        "rate_m3_s": velocity * sieve.area,
-        "rate_over_initial": velocity / course.velocity,
-        "k_over_k0": k_over_k0,
-        "filtrate_m3": filtrate,
-        "supplied_m3": float(solids.supplied.sum()),
-        "invaded_m3": inside,
-        "passed_m3": float(solids.passed.sum()),
-        "cake_m3": float(solids.cake.sum()),
-        "cake_thickness_m": thickness_of_cake(sieve, solids),
-        "pressure_cake_Pa": viscosity * velocity * cake,
-        "pressure_pack_Pa": viscosity * velocity * course.resistance / max(k_over_k0, 1e-300),
-    }
 
 
 def cake_permeability(case: InvasionCase) -> float | None:

@@ -92,12 +92,11 @@ def carry(
         feed: (N, C) concentrations of what enters a pore from outside.
         holds: (K, C) share that each link of `streams` holds back.
     """
-    after, held = np.zeros_like(inside), np.zeros_like(holds)
-    entered, passed = np.zeros_like(inside), np.zeros(inside.shape[1])
+    after, held = np.zeros_like(inside), np.empty_like(holds)
+    entered, passed = (filtrate * streams.fed)[:, None] * feed, np.zeros(inside.shape[1])
     _sweep(
         *(streams.order, streams.first, streams.target, filtrate * streams.share),
-        *(filtrate * streams.fed, streams.outlet, void, inside, feed, holds),
-        *(entered, after, held, passed),
+        *(streams.outlet, void, inside, holds, entered, after, held, passed),
     )
     return Swept(after, held, passed)
 
@@ -108,18 +107,16 @@ def _sweep(
     first: Array,
     target: Array,
     volume: Array,
-    fed: Array,
     outlet: Array,
     void: Array,
     inside: Array,
-    feed: Array,
     holds: Array,
     entered: Array,
     after: Array,
     held: Array,
     passed: Array,
 ) -> None:
-    """Sets `after` (N, C), `held` (K, C) and `passed` (C,); `entered` (N, C) holds zeros."""
+    """Sets `after` (N, C), `held` (K, C) and `passed` (C,); `entered` (N, C) holds what is fed."""
     classes = inside.shape[1]
     for place in range(len(order)):
         n = order[place]
@@ -132,7 +129,7 @@ def _sweep(
             leaving += volume[k]
         room = void[n] + leaving
         for i in range(classes):
-            come = inside[n, i] + fed[n] * feed[n, i] + entered[n, i]
+            come = inside[n, i] + entered[n, i]
             after[n, i] = come / room if room > 0.0 else 0.0
         for k in range(first[n], first[n + 1]):
             for i in range(classes):

@@ -4,6 +4,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
+from functools import partial
 from inspect import signature
 from typing import Any
 
@@ -11,16 +12,14 @@ from fdnet.case.units import converted
 from fdnet.commands.options import new_command
 from fdnet.files import path_option
 
-CORE, WELL, MUD = "the core", "the well", "the mud"
-_RUN = "run folder, or the folder of an ensemble, whose seeds then give the bands"
+CORE, WELL = "the core", "the well"
 
 
 def add_formation(commands: Any) -> None:
     """Adds `fdnet core` and `well` to the command line."""
     about = "flood a core of a run's sand with its mud, and turn the flow back"
     example = "fdnet core runs/mine --length 76mm --rate 1ml/min"
-    core = new_command(commands, "core", _core, about, example)
-    core.add(CORE, "run RUN", _RUN, path_option)
+    core = new_command(commands, "core", partial(_finish, "core"), about, example)
     core.add(CORE, "--length LENGTH", "of the core, as 76mm", _si("_m"), required=True)
     core.add(CORE, "--diameter LENGTH", "of the core (default 38 mm)", _si("_m"), 0.038)
     core.add(CORE, "--rate RATE", "of the flood, as 1ml/min", _si("_m3_s"))
@@ -32,18 +31,17 @@ def add_formation(commands: Any) -> None:
 
     about = "carry a run to a well: filtrate, invaded radius, k by depth, cake, skin"
     example = "fdnet well runs/mine --hours 12 --api-filtrate 8ml"
-    well = new_command(commands, "well", _well, about, example)
-    well.add(WELL, "run RUN", _RUN, path_option)
+    well = new_command(commands, "well", partial(_finish, "well"), about, example)
     well.add(WELL, "--hours N", "that the mud stands (default 12)", float, 12.0)
     well.add(WELL, "--height LENGTH", "of the well (default 1 m)", _si("_m"), 1.0)
     over = "overbalance, as 300psi (default: of the case)"
     well.add(WELL, "--pressure PRESSURE", over, _si("_Pa"))
     well.add(WELL, "--radius LENGTH", "of the well (default: of the case)", _si("_m"))
-    k = "permeability of the cake, as '1e-18 m2' (default: of the run's fines alone)"
-    api = "filtrate of the API's test in 30 minutes, as 8ml: gives the permeability of the cake"
-    for parser in (core, well):
-        parser.add(MUD, "--cake-permeability K", k, _si("_m2"))
-        parser.add(MUD, "--api-filtrate VOLUME", api, _si("_m3"))
+    run = "run folder, or the folder of an ensemble, whose seeds then give the bands"
+    api = "of the mud in 30 minutes, as 8ml: gives the permeability of the cake"
+    for parser, group in ((core, CORE), (well, WELL)):
+        parser.add(group, "run RUN", run, path_option)
+        parser.add(group, "--api-filtrate VOLUME", api, _si("_m3"))
         parser.share("--json", "--quiet")
 
 
@@ -59,33 +57,23 @@ def _si(suffix: str) -> Callable[[str], float]:
     return value
 
 
-def _core(options: argparse.Namespace) -> int:
-    from fdnet.formation.scale_up import core_flood
-
-    return _finish(options, "core", core_flood, "sections")
-
-
-def _well(options: argparse.Namespace) -> int:
-    from fdnet.formation.scale_up import well_invasion
-
-    return _finish(options, "well", well_invasion, "k_over_k0")
-
-
-def _finish(options: argparse.Namespace, name: str, model: Callable[..., Any], table: str) -> int:
+def _finish(name: str, options: argparse.Namespace) -> int:
     """Compute, keep the numbers and the figure in the folder, print them."""
     import pandas as pd
 
-    from fdnet.formation.scale_up import keep, with_band
+    from fdnet.formation.scale_up import core_flood, keep, well_invasion, with_band
 
-    names = (*signature(model).parameters, "cake_permeability", "api_filtrate")
-    given = {key: value for key, value in vars(options).items() if key in names}
+    model: Any = core_flood if name == "core" else well_invasion
+    known = signature(model).parameters
+    given = {key: value for key, value in vars(options).items() if key in known}
     found = model(options.run, **given)
     keep(options.run, name, found, given)
     if options.json:
         print(json.dumps(found, indent=2))
         return 0
-    keys = [key for key in found[table][0] if not key.endswith(("_low", "_high"))]
-    rows = [{key: with_band(row, key) for key in keys} for row in found[table]]
+    table = found["sections" if name == "core" else "k_over_k0"]
+    keys = [key for key in table[0] if not key.endswith(("_low", "_high"))]
+    rows = [{key: with_band(row, key) for key in keys} for row in table]
     print(*found["words"], "", pd.DataFrame(rows).to_string(index=False), sep="\n")
     for warning in () if options.quiet else found["warnings"]:
         print(f"fdnet: {warning}", file=sys.stderr)

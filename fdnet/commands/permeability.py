@@ -7,21 +7,10 @@ from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from fdnet import names
 from fdnet.commands.options import THE_FLOW, THE_SPHERES, new_command
 from fdnet.errors import CaseError, Doubt, explained
 from fdnet.files import path_option
-from fdnet.names import (
-    ALL_SPHERES,
-    AUTO,
-    DAMAGE_LAW_NAMES,
-    DEFAULT_LAW,
-    LAW_NAMES,
-    MOST_SPHERES,
-    SECTION_ARCHIE,
-    WALL_NAMES,
-    law_pairs,
-    off_by_factors,
-)
 
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
@@ -74,15 +63,15 @@ def add_permeability(commands: Any) -> None:
         "side walls hold the fluid, or it slips along them: slip for spheres cut out of a larger "
         "pack (default no-slip; known to lubrication and its damage laws)",
         default="no-slip",
-        choices=WALL_NAMES,
+        choices=names.WALL_NAMES,
     )
     flow("--sections N", "slabs along the flow (default 1)", int, 1)
-    flow("--law", f"conductance law (default {DEFAULT_LAW})", choices=LAW_NAMES)
+    flow("--law", f"conductance law (default {names.DEFAULT_LAW})", choices=names.LAW_NAMES)
     flow(
         "--damage-law",
-        f"damage law (default {AUTO}: up to {MOST_SPHERES} spheres {ALL_SPHERES}, above "
-        f"{SECTION_ARCHIE})",
-        choices=DAMAGE_LAW_NAMES,
+        f"damage law (default {names.AUTO}: up to {names.MOST_SPHERES} spheres "
+        f"{names.ALL_SPHERES}, above {names.SECTION_ARCHIE})",
+        choices=names.DAMAGE_LAW_NAMES,
     )
     flow("--compare-laws", "all laws with all damage laws as a table")
     parser.share("--json")
@@ -161,8 +150,8 @@ def _read(options: argparse.Namespace) -> "SphereFile":
     from fdnet.network.specimen import wide_fines
     from fdnet.spheres.readers import read_sphere_file
 
-    names = ("units", "box", "fines_below", "types", "periodic")
-    given = read_sphere_file(options.spheres, **{name: getattr(options, name) for name in names})
+    keys = ("units", "box", "fines_below", "types", "periodic")
+    given = read_sphere_file(options.spheres, **{key: getattr(options, key) for key in keys})
     grains, fines = given.spheres.grains(), given.spheres.fines()
     if len(grains) < (1 if any(given.periodic) else 4):
         why = "a periodic cell of fewer needs --periodic"
@@ -211,9 +200,10 @@ def _along(axis: str, given: "SphereFile", options: argparse.Namespace) -> list[
         walls = ", with walls across the flow" if set(walled) - {axis} else ""
         notes.append(Doubt("no-box", f"no --box given: the box around all grains was used{walls}"))
     notes += pack_doubts(given.spheres, axis, options.walls)
-    default, chosen = (DEFAULT_LAW, AUTO), (options.law or DEFAULT_LAW, options.damage_law or AUTO)
-    pairs = [chosen, *(law_pairs() if options.compare_laws else ())]
-    if off_by_factors(*chosen, fines=len(spheres.fines()) > 0):
+    default = names.DEFAULT_LAW, names.AUTO
+    chosen = options.law or default[0], options.damage_law or default[1]
+    pairs = [chosen, *(names.law_pairs() if options.compare_laws else ())]
+    if names.off_by_factors(*chosen, fines=len(spheres.fines()) > 0):
         pairs.append(default)
     results = compare(
         spheres,
@@ -242,14 +232,14 @@ def _assumptions(
     """What the answer rests on, one sentence each."""
     yield "The fluid creeps (Stokes flow): permeability depends on the geometry alone."
     if any(periodic):
-        names = ", ".join(axis for axis, yes in zip("xyz", periodic, strict=True) if yes)
-        yield f"The spheres repeat along {names}, with the sides of the box as periods."
+        along = ", ".join(axis for axis, yes in zip("xyz", periodic, strict=True) if yes)
+        yield f"The spheres repeat along {along}, with the sides of the box as periods."
     sides = [one for one, repeats in zip("xyz", periodic, strict=True) if not repeats]
     if walls := ", ".join(one for one in sides if one != given.axis):
         what = "hold the fluid" if given.walls == "no-slip" else "let the fluid slip"
         yield f"Sides across {walls} are walls that {what}; the flow has an inlet and an outlet."
     if given.law is None:
-        yield f"The conductance law is fdnet's default, {DEFAULT_LAW}."
+        yield f"The conductance law is fdnet's default, {names.DEFAULT_LAW}."
     if first.occupancy is not None:
         yield "Fines and grains stay where they are."
     if max(first.copies) > 1:

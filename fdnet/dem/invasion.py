@@ -19,7 +19,7 @@ import numpy as np
 
 from fdnet.case.case import InvasionCase
 from fdnet.dem import checkpoint, invade_deck
-from fdnet.dem.checkpoint import HISTORY, WATCHED, Checkpoint, Checkpoints, Deepest, Updates
+from fdnet.dem.checkpoint import WATCHED, Checkpoint, Checkpoints, Deepest, Updates
 from fdnet.dem.deck import Deck, LeftOut, snapshot_of
 from fdnet.dem.invade_deck import GIVEN, SCRATCH, SUPPLY, DrivingFluid, InvadeInputs, Moment
 from fdnet.dem.liggghts import SCREEN, Execution, Feed, Launch, run_deck
@@ -65,9 +65,6 @@ class ChunkedStage(ABC):
     def over(self, last: Any) -> bool:
         """Whether the checkpoint `last` is the end."""
 
-    def look_at(self, history: Sequence[Any], overlaps: Sequence[Deepest]) -> None:  # noqa: B027
-        """Raise LiggghtsError where what was seen at the checkpoints must stop the run."""
-
     def begin_chunk(self, feed: Feed, updates: Updates, last: Any | None) -> None:  # noqa: B027
         """Feed what a coupled stage takes in before the chunk after `last`."""
 
@@ -100,11 +97,8 @@ class ChunkedStage(ABC):
             last = self.points.last()
             self.points.cut(last)
             deck, name = self.write(last), self.deck if last is None else f"{self.deck}.resume"
-            if last is not None:
-                history = checkpoint.read_history(self.folder, self.points.kind)
-                self.look_at(history, checkpoint.read_watch(self.folder))
-                if self.over(last):
-                    return deck, runs
+            if last is not None and self.over(last):
+                return deck, runs
             launch = replace(self.launch, follow=self.follow)
             screen = self.folder / SCREEN
             screen.unlink(missing_ok=True)
@@ -129,7 +123,7 @@ class ChunkedStage(ABC):
         """Follow the screen and pass every line on.
 
         At each checkpoint it records what is whole now, keeps the two newest restarts, and stops a
-        run that writes to a full disk or whose fines overlap too much. LIGGGHTS itself goes on
+        run that writes to a full disk. LIGGGHTS itself goes on
         after a failed write and ends with exit code 0. Older restarts are removed only while there
         is room on the disk.
         """
@@ -148,11 +142,7 @@ class ChunkedStage(ABC):
         overlaps = [one for one in checkpoint.read_watch(self.folder) if since < one.step <= step]
         for row in rows:
             self.points.keep(row, ranks=self.launch.ranks, overlaps=overlaps)
-        if not rows and self.points.stage == "invade" and self.case.run.on_overlap == "stop":
-            missing = f"no row for the checkpoint at step {step}; continue with --resume"
-            raise LiggghtsError(f"{self.folder / HISTORY}: {missing}")
         self.points.remove_restarts(step)
-        self.look_at(rows, overlaps)
 
     def _play(self, name: str, last: Any | None, feed: Feed) -> None:
         """Feed LIGGGHTS a coupled stage, from the deck `name`, until its springs must be others.
@@ -315,26 +305,6 @@ class InvadeStage(ChunkedStage):
         before = lasting(begun[0], earlier[-1]) if earlier else 0.0
         seen, steps = lasting(begun[1], last), last.step - begun[1]
         return stiffened(case, scales, checkpoint.steps_after(case, steps, seen, before))
-
-    def look_at(self, history: Sequence[Checkpoint], overlaps: Sequence[Deepest]) -> None:
-        """Raise LiggghtsError when a fine overlapped too much and `run.on_overlap` is "stop".
-
-        Everything up to the last checkpoint of the `history` stays on disk.
-        """
-        case = self.case
-        if case.run.on_overlap != "stop" or not history:
-            return
-        states = checkpoint.readable_states(self.folder, history, case, self.scales, self.grains)
-        shown = [checkpoint.overlap_in(case, state) for _, state in states]
-        deepest = checkpoint.deepest_of([*overlaps, *shown])
-        if deepest.fraction > case.run.max_overlap:
-            last = history[-1]
-            text = checkpoint.overlap_text(case, deepest, self.pace(last).stiffness)
-            raise LiggghtsError(
-                f"{self.folder}: {text}, and start over with --force; stopped at checkpoint "
-                f"{last.chunk} (step {last.step}) because of run.on_overlap = 'stop'; go on from "
-                "here with --resume --set run.on_overlap=warn (or a larger run.max_overlap)"
-            )
 
     def begin_chunk(self, feed: Feed, updates: Updates, last: Checkpoint | None) -> None:
         """Feed the batches that are due, and the grains that are watched next."""

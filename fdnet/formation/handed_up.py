@@ -11,9 +11,8 @@ volume, those that passed by the share that gets through the length.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,24 +26,19 @@ from fdnet.formation.model import FineClass, Medium
 from fdnet.report.figures import BLUE, DEPTH_LABEL, GREY, MM, draw, stairs
 from fdnet.run.by_classes import FIRST_DRAWN, Rested, rested_classes
 from fdnet.run.finished import FinishedRun, open_run
-from fdnet.run.folder import MANIFEST, is_run_folder
+from fdnet.run.folder import MANIFEST
 from fdnet.spheres.snapshot import Array
 
 FEWEST, LEAST_LOSS, MISFIT, DRAWS, PLACES = 30, 0.02, 0.1, 24, 800
 """Fines that a fit needs, least loss that gives a damage, misfit that is said, draws, places."""
-_BOUNDS = ((0.0, 18.0), (-4.0, 8.0))
 
 
 class DepthFit(NamedTuple):
-    """ln(rate m) and g of a deposit, their covariance (2, 2), largest difference of the shares."""
+    """The filtration that the depths of fines tell."""
 
-    values: Array
-    covariance: Array
-    misfit: float
-
-    def drawn(self, normal: Array) -> Array:
-        """ln(rate m) and g for a draw (2,) of the normal distribution."""
-        return self.values + np.linalg.cholesky(self.covariance) @ normal
+    values: Array  # (2,) ln(rate m) and g
+    covariance: Array  # (2, 2) of them
+    misfit: float  # largest difference of the shares that get deeper
 
 
 def fit_depths(fines: Rested, length: float) -> DepthFit:
@@ -63,12 +57,8 @@ def fit_depths(fines: Rested, length: float) -> DepthFit:
         inside = values[0] + np.log(w / g) - np.log1p(-w)
         return np.append(inside[:-1], np.log(np.log1p(-w[-1]) / -g) if passed else 0.0)
 
-    best = minimize(
-        lambda values: -float(weight @ logs(values)),
-        [-math.log(far), 0.5],
-        bounds=_BOUNDS,
-        method="Nelder-Mead",
-    ).x
+    first, bounds = [-math.log(far), 0.5], ((0.0, 18.0), (-4.0, 8.0))
+    best = minimize(lambda v: -(weight @ logs(v)), first, bounds=bounds, method="Nelder-Mead").x
     scores = np.stack([(logs(best + e) - logs(best - e)) / 2e-4 for e in 1e-4 * np.eye(2)])
     order = np.argsort(depth)
     reached = np.cumsum(volume[order]) / (whole + passed)
@@ -94,32 +84,16 @@ def fit_damage(kept: Array, deposit: Array, share: Array) -> tuple[float, float]
 
 
 class HandedUp(NamedTuple):
-    """What a specimen hands up, and the evidence for it.
-
-    Attributes:
-        run: that it comes from.
-        medium: rock and mud of `fdnet.formation.model.march`.
-        fitted: (F,) deposit at F even depths of the specimen, by the fit.
-        notes: what could not be told, and what was assumed.
-    """
+    """What a specimen hands up, and the evidence for it."""
 
     run: FinishedRun
-    medium: Medium
-    fitted: Array
-    notes: tuple[str, ...]
-
-    def values(self) -> dict[str, float | None]:
-        """The fitted numbers by name, SI; of several classes each with the name of its class."""
-        found, medium = dict[str, float | None](), self.medium
-        for one in medium.mud:
-            end = f"_{one.name}" if len(medium.mud) > 1 else ""
-            found |= {f"rate_1_m{end}": one.rate, f"growth{end}": one.growth}
-        found |= {"closing_deposit": medium.closing, "damage": medium.damage}
-        return found | {"cake_permeability_m2": medium.cake_permeability}
+    medium: Medium  # rock and mud of `fdnet.formation.model.march`
+    fitted: Array  # (F,) deposit at `places_of` the run, by the fit
+    notes: tuple[str, ...]  # what could not be told, and what was assumed
 
 
 def places_of(run: FinishedRun) -> Array:
-    """(F,) m, depths of `HandedUp.fitted`."""
+    """(F,) m, even depths of the specimen."""
     return (np.arange(PLACES) + 0.5) * (run.case.size_m[0] / PLACES)
 
 
@@ -148,17 +122,14 @@ def hand_up(source: str | Path | FinishedRun) -> list[HandedUp]:
     if isinstance(source, FinishedRun):
         return _of_run(source)
     folder = expanded(source)
-    if is_run_folder(folder) or not folder.is_dir():
-        return _of_run(open_run(folder))
-    runs = [open_run(one.parent) for one in sorted((folder / "runs").glob(f"*/{MANIFEST}"))]
-    if not runs:
-        raise CaseError(f"{folder}: holds no finished run; give a run folder or an ensemble")
+    folders = [one.parent for one in sorted((folder / "runs").glob(f"*/{MANIFEST}"))]
+    runs = [open_run(one) for one in folders or [folder]]
     cases = [{**one.case.data(), "seed": 0} for one in runs]
     if any(case != cases[0] for case in cases):
         raise CaseError(
             f"{folder}: its runs differ by more than the seed; give one of them, or an ensemble"
         )
-    return [_of_run(run)[0] for run in runs]
+    return [_of_run(run)[0] for run in runs] if runs[1:] else _of_run(runs[0])
 
 
 def _rested(run: FinishedRun, case: InvasionCase) -> list[Rested]:
@@ -168,13 +139,13 @@ def _rested(run: FinishedRun, case: InvasionCase) -> list[Rested]:
         return classes
     fines = run.spheres().fines()
     fines = fines.where(fines.id < FIRST_DRAWN)
-    depth, volume = fines.position[:, 0], 4 / 3 * np.pi * fines.radius**3
-    inside = (depth >= 0) & (depth < case.size_m[0])
+    inside = (fines.position[:, 0] >= 0) & (fines.position[:, 0] < case.size_m[0])
+    volume = 4 / 3 * np.pi * fines.radius**3
     last = run.history if case.with_classes else run.summary
     spheres = Rested(
         name=f"{2e6 * fines.radius.mean():.3g} µm",
         concentration=case.fines.volume_fraction - sum(one.concentration for one in classes),
-        depth=depth[inside],
+        depth=fines.position[inside, 0],
         volume=volume[inside],
         passed=float(np.max(last["passed_count"])) * float(volume.mean()),
         number=float(volume[inside].sum() ** 2 / max(np.sum(volume[inside] ** 2), 1e-300)),
@@ -187,8 +158,12 @@ def _of_run(run: FinishedRun) -> list[HandedUp]:
     if not isinstance(case, InvasionCase) or not summary["supplied_count"]:
         raise CaseError(f"{start}no fines were supplied, so nothing is filtered")
     length, area = case.size_m[0], math.prod(case.size_m[1:])
-    kinds, shut, notes = _rested(run, case), summary["stop_reason"] == "plugged", list[str]()
-    found, passed = round(sum(one.number for one in kinds)), summary["passed_count"]
+    kinds, shut, passed = (
+        _rested(run, case),
+        summary["stop_reason"] == "plugged",
+        summary["passed_count"],
+    )
+    found = round(sum(one.number for one in kinds))
     if found == 0 and passed:
         raise CaseError(
             f"{start}all {passed} fines passed {1e3 * length:g} mm, none was filtered: the rate "
@@ -199,24 +174,11 @@ def _of_run(run: FinishedRun) -> list[HandedUp]:
             f"{start}{found} fines inside, {FEWEST} are needed to fit a rate of filtration, or a "
             "face that closes; supply more mud"
         )
-    medium = Medium(
-        porosity=run.porosity_initial,
-        permeability=run.k_initial_m2,
-        viscosity=case.fluid.viscosity_Pa_s,
-        mud=tuple(FineClass(one.name, one.concentration, 0.0) for one in kinds),
-        closing=0.0,
-        **_cake(summary, notes),
-        **_release(run, length, notes),
-    )
+    mud = [FineClass(one.name, one.concentration, 0.0) for one in kinds]
+    medium, notes = _without_filtration(run, case, mud, shut)
     if found < FEWEST:
         notes.append(f"only {found} fines entered before the face closed: all is cake")
         return [HandedUp(run, medium, np.zeros(PLACES), tuple(notes))]
-    if not shut:
-        medium = replace(medium, cake_permeability=None)
-        notes.append(
-            f"the run ended by {summary['stop_reason']} and not by a closed face: what follows "
-            "when the face has this deposit is not known"
-        )
     fits = [fit_depths(one, length) for one in kinds]
     if (worst := max(fit.misfit for fit in fits)) > MISFIT:
         notes.append(f"the fitted depths differ from the measured by {worst:.0%} of the fines")
@@ -225,34 +187,6 @@ def _of_run(run: FinishedRun) -> list[HandedUp]:
             f"too little of the fines of {', '.join(few)} rests inside for more than one number: "
             "their filtration is taken as constant"
         )
-    amounts = np.array([(one.volume.sum() + one.passed) / area for one in kinds])
-    spread = np.array([max(one.number, 1.0) for one in kinds]) ** -0.5
-    random, many = np.random.default_rng(0), list[HandedUp]()
-    for number in range(DRAWS + 1):
-        normal = random.standard_normal((len(kinds), 3)) * (number > 0)
-        drawn = [fit.drawn(z) for fit, z in zip(fits, normal[:, :2], strict=True)]
-        rate, g = np.exp([one[0] for one in drawn]), np.array([one[1] for one in drawn])
-        amount = amounts * (1 + normal[:, 2] * spread)
-        face = float(np.sum(amount * rate * np.expm1(g) / g))
-        w = -np.expm1(-g) * np.exp(-np.outer(places_of(run), rate))
-        fitted = np.sum(amount * rate * w / (1 - w) / g, axis=1)
-        harm, error = _damage(start, run, fitted)
-        mud = [
-            one._replace(rate=float(of_it), growth=float(more))
-            for one, of_it, more in zip(medium.mud, rate, np.expm1(g) / face, strict=True)
-        ]
-        own = replace(
-            medium,
-            damage=math.exp(harm + error * random.standard_normal() * (number > 0)),
-            mud=tuple(mud),
-            closing=face,
-        )
-        many.append(HandedUp(run, own, fitted, tuple(notes)))
-    return many
-
-
-def _damage(start: str, run: FinishedRun, fitted: Array) -> tuple[float, float]:
-    """`fit_damage` of the fitted deposit over the sections that have an open path."""
     kept, x = kept_by(run), places_of(run)
     paths = (kept > 0) & np.isfinite(kept)
     if not paths.any() or kept[paths].min() > 1 - LEAST_LOSS:
@@ -261,55 +195,92 @@ def _damage(start: str, run: FinishedRun, fitted: Array) -> tuple[float, float]:
             "deposit cannot be told; supply more mud"
         )
     low, high = run.sections[paths][["x_lo_m", "x_hi_m"]].to_numpy().T[..., None]
-    share = (x >= low) & (x < high)
-    return fit_damage(kept[paths], fitted, share / share.sum(axis=1, keepdims=True))
+    share = ((x >= low) & (x < high)).astype(float)
+    share /= share.sum(axis=1, keepdims=True)
+    amounts = np.array([(one.volume.sum() + one.passed) / area for one in kinds])
+    spread = np.array([max(one.number, 1.0) for one in kinds]) ** -0.5
+    best = np.array([fit.values for fit in fits])
+    errors = [np.linalg.cholesky(fit.covariance) for fit in fits]
+    random, many = np.random.default_rng(0), list[HandedUp]()
+    for number in range(DRAWS + 1):  # the first is the fit itself
+        normal = random.standard_normal((len(kinds), 3)) * (number > 0)
+        logs, g = (best + [e @ z for e, z in zip(errors, normal[:, :2], strict=True)]).T
+        rate, amount = np.exp(logs), amounts * (1 + normal[:, 2] * spread)
+        face = float(np.sum(amount * rate * np.expm1(g) / g))
+        w = -np.expm1(-g) * np.exp(-np.outer(x, rate))
+        fitted = np.sum(amount * rate * w / (1 - w) / g, axis=1)
+        harm, error = fit_damage(kept[paths], fitted, share)
+        drawn = zip(mud, rate.tolist(), (np.expm1(g) / face).tolist(), strict=True)
+        own = replace(
+            medium,
+            damage=math.exp(harm + error * random.standard_normal() * (number > 0)),
+            mud=tuple(one._replace(rate=of_it, growth=growth) for one, of_it, growth in drawn),
+            closing=face,
+        )
+        many.append(HandedUp(run, own, fitted, tuple(notes)))
+    return many
 
 
-def _cake(summary: Mapping[str, Any], notes: list[str]) -> dict[str, Any]:
-    """The cake of the packed slices, also where they are thinner than a cake should be."""
-    cake = summary.get("cake") or {}
+def _without_filtration(
+    run: FinishedRun, case: InvasionCase, mud: Sequence[FineClass], shut: bool
+) -> tuple[Medium, list[str]]:
+    """Rock and mud whose face is closed, and notes.
+
+    The cake is that of the packed slices, also where they are thinner than a cake should be. The
+    share that back-flow takes is that of the run's clean-up.
+    """
+    notes, k, cleaned = list[str](), None, run.summary.get("clean_up")
+    cake = run.summary.get("cake") or {}
     if not cake.get("packed_thickness_m"):
         notes.append("no packed cake stands before the face: its permeability is not known")
-        return {}
-    k = cake["k_m2"]
-    if k is None:
+        cake = {"porosity": 0.5}
+    elif (k := cake["k_m2"]) is None:
         notes.append(f"{cake['no_cake_yet']}; its permeability is taken as if it were one")
         k = cake["packed_thickness_m"] / cake["resistance_1_m"]
-    return {"cake_porosity": cake["porosity"], "cake_permeability": k}
-
-
-def _release(run: FinishedRun, length: float, notes: list[str]) -> dict[str, Any]:
-    """The share that the clean-up of the run took away; its pace is assumed."""
-    cleaned = run.summary.get("clean_up")
-    if not cleaned or not cleaned["inside_before"]:
-        return {}
-    share = cleaned["came_out"] / cleaned["inside_before"]
-    notes.append(
-        f"back-flow takes {share:.0%} of the deposit, as the clean-up of the run did; that it "
-        "falls to 1/e with each pore volume of the specimen is assumed"
+    share = cleaned["came_out"] / max(cleaned["inside_before"], 1) if cleaned else 0.0
+    if share:
+        notes.append(
+            f"back-flow takes {share:.0%} of the deposit, as the clean-up of the run did; that "
+            "it falls to 1/e with each pore volume of the specimen is assumed"
+        )
+    if not shut:
+        notes.append(
+            f"the run ended by {run.summary['stop_reason']} and not by a closed face: what "
+            "follows when the face has this deposit is not known"
+        )
+    medium = Medium(
+        porosity=run.porosity_initial,
+        permeability=run.k_initial_m2,
+        viscosity=case.fluid.viscosity_Pa_s,
+        mud=tuple(mud),
+        closing=0.0,
+        cake_porosity=cake["porosity"],
+        cake_permeability=k if shut else None,
+        released=share,
+        release_rate=1 / (run.porosity_initial * case.size_m[0]),
     )
-    return {"released": share, "release_rate": 1 / (run.porosity_initial * length)}
+    return medium, notes
 
 
-# ---- The fit over what it comes from.
 def draw_fit(handed: Sequence[HandedUp], path: Path) -> Path:
     """Deposit by depth and k / k0 of the sections, measured and by the model; of each run."""
-    return draw(path, partial(_fill, handed=handed))
+    runs = {one.run.path: one.run for one in handed}
 
-
-def _fill(figure: Any, *, handed: Sequence[HandedUp]) -> None:
-    above, below = figure.subplots(2, 1, sharex=True)
-    line = {"color": BLUE, "linewidth": 1.0, "alpha": 0.5}
-    for number, one in enumerate(handed):
-        run, x = one.run, places_of(one.run) * MM
-        if number == 0 or run is not handed[0].run:
+    def fill(figure: Any) -> None:
+        above, below = figure.subplots(2, 1, sharex=True)
+        for run in runs.values():
             taken = run.profile["porosity_initial"] - run.profile["porosity_damaged"]
             stairs(above, _edges(run.profile), taken.where(taken > 0), color=GREY)
             stairs(below, _edges(run.sections), kept_by(run), color=GREY)
-        above.plot(x, one.fitted, **line)
-        below.plot(x, 1 / one.medium.loss(one.fitted), **line)
-    above.set(yscale="log", ylabel="deposit (share of volume)", ylim=(1e-4, 1))
-    below.set(xlabel=DEPTH_LABEL, ylabel="k / k0", ylim=(0, 1.05))
+        line: Any = {"color": BLUE, "linewidth": 1.0, "alpha": 0.5}
+        for one in handed:
+            x = places_of(one.run) * MM
+            above.plot(x, one.fitted, **line)
+            below.plot(x, 1 / one.medium.loss(one.fitted), **line)
+        above.set(yscale="log", ylabel="deposit (share of volume)", ylim=(1e-4, 1))
+        below.set(xlabel=DEPTH_LABEL, ylabel="k / k0", ylim=(0, 1.05))
+
+    return draw(path, fill)
 
 
 def _edges(table: Any) -> Array:

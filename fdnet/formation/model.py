@@ -11,7 +11,6 @@ Formulas, sources and cells are derived on docs/theory/from_core_to_well.md.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,18 +30,13 @@ class Column:
     edges: Array  # (J+1,) m, depths from the face, 0 first
     area: float  # m2, of the face
     well: float = math.inf  # m, radius of the face; infinite for a straight core
-    # m, depth where the pressure is held; sound rock lies between the last edge and it
-    outer: float = 0.0
-
-    @property
-    def width(self) -> Array:
-        """(J,) m."""
-        return np.diff(self.edges)
+    outer: float = 0.0  # m, depth where the pressure is held; sound rock up to it
 
     @property
     def volume(self) -> Array:
         """(J,) m3 of each cell."""
-        return self.area * self.width * (1.0 + (self.edges[1:] + self.edges[:-1]) / 2 / self.well)
+        middle = (self.edges[1:] + self.edges[:-1]) / 2
+        return self.area * np.diff(self.edges) * (1.0 + middle / self.well)
 
     def reach(self, depth: Any) -> Array:
         """Integral of dx / A from the face to depths (N,) m, 1/m; over k it is a resistance."""
@@ -57,35 +51,28 @@ def steep_grid(length: float, cells: int, scale: float) -> Array:
 
 
 class FineClass(NamedTuple):
-    """Fines that are filtered alike: their volume over that of mud, the filtration coefficient
-    1/m of clean rock, and its relative growth with the deposit of all classes."""
+    """Fines that are filtered alike."""
 
     name: str
-    concentration: float
-    rate: float
-    growth: float = 0.0
+    concentration: float  # their volume over that of the mud
+    rate: float  # 1/m, the filtration coefficient of clean rock
+    growth: float = 0.0  # its relative growth with the deposit of all classes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Medium:
     """A rock and a mud as the model knows them, SI units."""
 
-    # porosity, permeability: of sound rock
-    porosity: float
-    permeability: float
-    # damage, power: a deposit s leaves permeability / (1 + damage s)^power
+    porosity: float  # of sound rock
+    permeability: float  # m2, of sound rock; a deposit s leaves 1 / (1 + damage s)^power of it
     damage: float = 0.0
     power: float = 2.0
-    # viscosity, mud: of the fluid, Pa s, and its classes
-    viscosity: float = 1e-3
+    viscosity: float = 1e-3  # Pa s
     mud: tuple[FineClass, ...] = ()
-    # deposit of the face at which it closes; 0: at once, infinite: never
-    closing: float = math.inf
-    # cake_porosity, cake_permeability: of what the solids build on the closed face; without a
-    # permeability nothing is known from then on
+    closing: float = math.inf  # deposit of the face that closes it; 0: at once, infinite: never
     cake_porosity: float = 0.5
+    # m2, of what the solids build on the closed face; without it nothing is known from then on
     cake_permeability: float | None = None
-    cake_shape: str = "linear"  # as `cake_skin` names it
     released: float = 0.0  # share of the deposit that back-flow can take away
     release_rate: float = 0.0  # 1/m, how fast it decays with the back-flow over the area
 
@@ -121,9 +108,8 @@ def cake_skin(shape: str, thickness: float, well: float) -> float:
     ratio = thickness / well
     if shape in ("linear", "linrad"):
         return ratio if shape == "linear" else math.log1p(ratio)
-    if shape == "radial":
-        return 0.5 * math.log1p(2 * ratio)
-    return -0.5 * math.log1p(-2 * ratio) if 2 * ratio < 1 else math.inf
+    sign = 1 if shape == "radial" else -1
+    return sign * math.log1p(sign * 2 * ratio) / 2 if sign * 2 * ratio > -1 else math.inf
 
 
 def damage_skin(column: Column, loss: Array) -> float:
@@ -135,35 +121,25 @@ def damage_skin(column: Column, loss: Array) -> float:
 class Filled(NamedTuple):
     """Where the fines of C classes are, in J cells."""
 
-    # suspended, deposit, held: (C, J) volume of fines over that of fluid, over bulk volume, and
-    # the part of this that back-flow cannot take
-    suspended: Array
-    deposit: Array
-    held: Array
+    suspended: Array  # (C, J) volume of fines over that of fluid
+    deposit: Array  # (C, J) over bulk volume
+    held: Array  # (C, J) the part of the deposit that back-flow cannot take
     face: float  # deposit of all classes at the face itself
-    # cake, supplied, passed, returned: (C,) m3 in the cake, with the mud, out of the far end and
-    # out of the face
-    cake: Array
-    supplied: Array
-    passed: Array
-    returned: Array
+    cake: Array  # (C,) m3
 
 
 class March(NamedTuple):
     """What `march` gives, at N moments, in S sections, for C classes."""
 
-    # time, filtrate: (N,) s and m3 (what flowed in less what flowed back)
-    time: Array
-    filtrate: Array
+    time: Array  # (N,) s
+    filtrate: Array  # (N,) m3, what flowed in less what flowed back
     rate: Array  # (N,) m3/s
     parts: Array  # (N, S+2) Pa, lost in the cake, each section, and behind the sections
     k_over_k0: Array  # (N, S) of the sections
     effluent: Array  # (N, C) volume of fines over volume of fluid that leaves
     end: Filled  # the last state
     closed_at: float | None  # s, when the cake began first; None: never
-    # "" at the end of the drives; "closed" where the face closed and the cake is not known, "full"
-    # where the cake filled the well
-    stopped: str
+    stopped: str  # "closed": the face did and its cake is not known; "full": the well is, of cake
 
 
 def march(
@@ -181,53 +157,51 @@ def march(
     it to first order.
     """
     none, mu = np.zeros(len(medium.mud)), medium.viscosity
-    cells = np.zeros((len(none), len(column.width)))
-    state = Filled(cells, cells, cells, 0.0, none, none, none, none)
-    at = column.edges[[0, -1]] if taps is None else taps
-    resistances = partial(_resistances, column, medium, column.reach(at))
+    cells = np.zeros((len(none), len(column.edges) - 1))
+    state = Filled(cells, cells, cells, 0.0, none)
+    at = column.reach(column.edges[[0, -1]] if taps is None else taps)
     small = fineness / 10 * medium.porosity * float(column.volume.sum())
     time, filtrate, closed_at, stopped = 0.0, 0.0, None, ""
-    parts, rows = resistances(state), list[tuple[Any, ...]]()
+    parts, rows = _resistances(column, medium, at, state), list[tuple[Any, ...]]()
     for drive in drives:
         end, since, back = time + drive.seconds, 0.0, drive.flow(1.0) < 0
         if back:
             held = np.maximum(state.held, (1 - medium.released) * state.deposit)
-            state = state._replace(returned=state.returned + state.cake, cake=none, held=held)
-            parts = resistances(state)
+            state = state._replace(cake=none, held=held)
+            parts = _resistances(column, medium, at, state)
         if not rows:
             rows.append((time, filtrate, drive.flow(mu * parts.sum()), parts, none))
-        while time < end:
+        while time < end and not stopped:
             shut = not back and state.face >= medium.closing
             if shut:
                 closed_at = time if closed_at is None else closed_at
-                stopped = "closed" if medium.cake_permeability is None else stopped
-            if stopped:
-                break
+                if medium.cake_permeability is None:
+                    stopped = "closed"
+                    break
             step, to_closing = fineness * since + small, math.inf
             if not back and not shut:
                 most, to_closing = _until(state, column, medium, fineness)
                 step = min(step, most, to_closing)
-            for _ in range(60):
+            early = -math.inf
+            while early < -_LANDED:
                 after, effluent = _moved(state, column, medium, step, back, shut)
-                new = resistances(after)
+                new = _resistances(column, medium, at, after)
                 if not np.isfinite(new).all():
                     stopped = "full"
                     break
-                seconds = step / abs(drive.flow(mu * (parts + new).sum() / 2))
+                seconds, tried = step / abs(drive.flow(mu * (parts + new).sum() / 2)), step
                 early = (end - time - seconds) / drive.seconds
-                if early >= -_LANDED:
-                    break
-                step *= (end - time) / seconds
+                step *= min((end - time) / seconds, 1.0)
             if stopped:
                 break
             time = end if early <= _LANDED else time + seconds
-            filtrate, since = filtrate + (-step if back else step), since + step
-            if step == to_closing:
+            filtrate, since = filtrate + (-tried if back else tried), since + tried
+            if tried == to_closing:
                 after, since = after._replace(face=medium.closing), 0.0
             state, parts = after, new
             rows.append((time, filtrate, drive.flow(mu * parts.sum()), parts, effluent))
     times, volumes, rates, met, effluents = (np.array(one) for one in zip(*rows, strict=True))
-    kept = np.diff(column.reach(at)) / medium.permeability / met[:, 1:-1]
+    kept = np.diff(at) / medium.permeability / met[:, 1:-1]
     drops = mu * rates[:, None] * met
     return March(times, volumes, rates, drops, kept, effluents, state, closed_at, stopped)
 
@@ -235,7 +209,8 @@ def march(
 def _resistances(column: Column, medium: Medium, at: Array, state: Filled) -> Array:
     """(S+2,) resistances over viscosity, 1/m3, of cake, sections and the rest of the way.
 
-    That of a cake which fills the well is infinite.
+    The sections lie between the `at` (S+1,), as `Column.reach`. A cake that fills the well has an
+    infinite one.
     """
     reach, loss = column.reach(column.edges), medium.loss(state.deposit.sum(axis=0))
     cells = np.append(0.0, np.cumsum(np.diff(reach) * loss))
@@ -244,12 +219,12 @@ def _resistances(column: Column, medium: Medium, at: Array, state: Filled) -> Ar
     own = 0.0
     if medium.cake_permeability and state.cake.any():
         thick = state.cake.sum() / ((1 - medium.cake_porosity) * column.area)
-        own = thick / column.area
         if math.isfinite(column.well):
-            own = cake_skin(medium.cake_shape, thick, column.well) * column.well / column.area
+            own = cake_skin("inward", thick, column.well) * column.well / column.area
+        else:
+            own = thick / column.area
         own *= medium.permeability / medium.cake_permeability
-    ends = cells[-1] - inside[-1] + outer
-    return np.array([own, *np.diff(inside), ends]) / medium.permeability
+    return np.array([own, *np.diff(inside), cells[-1] - inside[-1] + outer]) / medium.permeability
 
 
 def _at_the_face(medium: Medium, face: float) -> tuple[float, float]:
@@ -279,40 +254,31 @@ def _moved(
     enter; the mud whose place the cake takes brings its own solids.
     """
     _, solids, rate, growth = (np.array(one) for one in zip(*medium.mud, strict=True))
-    pores, inflow = medium.porosity * column.volume, np.zeros_like(state.deposit)
+    width, bulk, inflow = np.diff(column.edges), column.volume, np.zeros_like(state.deposit)
+    pores = medium.porosity * bulk
     if back:
         pace = medium.release_rate * volume
-        freed = (state.deposit - state.held) * -np.expm1(-pace * column.width / column.volume)
-        source = (freed * column.volume / volume)[:, ::-1]
+        freed = (state.deposit - state.held) * -np.expm1(-pace * width / bulk)
+        source = (freed * bulk / volume)[:, ::-1]
         out, last = _sweep(source, state.suspended[:, ::-1], pores[::-1], inflow, volume)
-        after = state._replace(
-            suspended=last[:, ::-1],
-            deposit=state.deposit - freed,
-            face=state.face * (1 + medium.released * math.expm1(-pace / column.area)),
-            returned=state.returned + out[:, -1] * volume,
-        )
-        return after, out[:, -1]
+        face = state.face * (1 + medium.released * math.expm1(-pace / column.area))
+        deposit = state.deposit - freed
+        return state._replace(suspended=last[:, ::-1], deposit=deposit, face=face), out[:, -1]
     start, slope = (one * volume / column.area for one in _at_the_face(medium, state.face))
     if shut:
         free = 1 - medium.cake_porosity
         built = free * solids / (free - solids.sum()) * volume
-        state = state._replace(cake=state.cake + built, supplied=state.supplied + built)
+        state = state._replace(cake=state.cake + built)
         solids, start, slope = 0.0 * solids, 0.0, 0.0
     inflow[:, 0] = solids
     total = before = state.deposit.sum(axis=0)
     for _ in range(2 if growth.any() else 1):
-        catch = rate[:, None] * (1 + growth[:, None] * total) * column.width
+        catch = rate[:, None] * (1 + growth[:, None] * total) * width
         out, last = _sweep(inflow, state.suspended, pores, catch, volume)
-        caught = np.expm1(catch) * out * volume / column.volume
+        caught = np.expm1(catch) * out * volume / bulk
         total = before + caught.sum(axis=0) / 2
-    after = state._replace(
-        suspended=last,
-        deposit=state.deposit + caught,
-        face=state.face + start * (math.expm1(slope) / slope if slope else 1.0),
-        supplied=state.supplied + solids * volume,
-        passed=state.passed + out[:, -1] * volume,
-    )
-    return after, out[:, -1]
+    face = state.face + start * (math.expm1(slope) / slope if slope else 1.0)
+    return state._replace(suspended=last, deposit=state.deposit + caught, face=face), out[:, -1]
 
 
 def _sweep(

@@ -1,4 +1,8 @@
-"""A core and a well by the model, from what a specimen hands up, with bands."""
+"""A core and a well by the model, from what a specimen hands up, with bands.
+
+Both give numbers in SI by name, with the ends of their 95 % bands as `_low` and `_high`, rows by
+place, what was `handed_up`, `warnings`, and the answer in `words`.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -11,17 +15,8 @@ import pandas as pd
 
 from fdnet.errors import CaseError
 from fdnet.files import write_text
+from fdnet.formation import model
 from fdnet.formation.handed_up import HandedUp, draw_fit, hand_up
-from fdnet.formation.model import (
-    Column,
-    Flood,
-    March,
-    Medium,
-    cake_skin,
-    damage_skin,
-    march,
-    steep_grid,
-)
 from fdnet.report.html import FORMATION, formation_html, put_section
 from fdnet.report.tables import plain_json
 from fdnet.run.answer import DAMAGED_FROM, flow_lost, hawkins
@@ -47,7 +42,7 @@ def core_flood(
     minutes: float = 30.0,
     back_flow: float = 10.0,
     sections: int = 4,
-    **cake: Any,
+    api_filtrate: float | None = None,
 ) -> dict[str, Any]:
     """A core of the specimen's sand flooded with its mud; then the flow is turned back.
 
@@ -58,12 +53,7 @@ def core_flood(
         minutes: of the flood.
         back_flow: pore volumes that flow back, where the run had a clean-up.
         sections: equal ones, between pressure taps.
-        cake: `cake_permeability` m2, or `api_filtrate` m3 that it follows from.
-
-    Returns:
-        Numbers in SI, with their 95 % bands as `_low` and `_high`: `k_over_k0`, `filtrate_m3`,
-        `effluent_over_c0`, `return_k_over_k0` (after a clean-up) and others; `sections`,
-        `handed_up`, `warnings`, and `words`.
+        api_filtrate: m3 in the API's test, which the permeability of the cake follows from.
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
@@ -73,20 +63,20 @@ def core_flood(
     _above_zero(length=length, diameter=diameter, minutes=minutes, sections=sections)
     _above_zero(rate=rate, pressure=pressure, back_flow=back_flow)
     area, taps = math.pi * diameter**2 / 4, np.linspace(0.0, length, sections + 1)
-    drive = Flood(60 * minutes, pressure or math.nan, rate)
+    drive = model.Flood(60 * minutes, pressure or math.nan, rate)
 
     def flooded(handed: HandedUp) -> dict[str, Any]:
         medium = handed.medium
         scale = 1 / (_steepest(medium) + 1 / length)
-        column = Column(edges=steep_grid(length, CELLS, scale), area=area)
-        made = march(column, medium, [drive], taps=taps)
+        column = model.Column(edges=model.steep_grid(length, CELLS, scale), area=area)
+        made = model.march(column, medium, [drive], taps=taps)
         kept = {"k_over_k0": made.k_over_k0[-1]}
         if medium.released:
             flow = abs(float(made.rate[0]))
             seconds = back_flow * medium.porosity * area * length / flow
-            forth, back = drive._replace(seconds=made.time[-1]), Flood(seconds, rate=-flow)
-            after = march(column, medium, [forth, back], taps=taps).k_over_k0[-1]
-            kept["return_k_over_k0"] = after
+            forth, back = drive._replace(seconds=made.time[-1]), model.Flood(seconds, rate=-flow)
+            after = model.march(column, medium, [forth, back], taps=taps)
+            kept["return_k_over_k0"] = after.k_over_k0[-1]
         drops = np.cumsum(made.parts[-1, ::-1])[::-1]
         table = {"x_lo_m": taps[:-1], "x_hi_m": taps[1:], "pressure_Pa": drops[1:-1], **kept}
         return {
@@ -95,11 +85,10 @@ def core_flood(
             "rate_m3_s": float(made.rate[-1]),
             "pressure_Pa": float(drops[0]),
             "effluent_over_c0": float(made.effluent[-1].sum() / medium.solids),
-            "pressure_cake_Pa": float(made.parts[-1, 0]),
             "sections": pd.DataFrame(table).to_dict("records"),
         }
 
-    found = _banded(source, flooded, **cake)
+    found = _banded(source, flooded, api_filtrate)
     face = found["sections"][0]
     words = [
         f"A core of {1e3 * length:g} mm keeps {with_band(found, 'k_over_k0')} of its k0.",
@@ -120,9 +109,12 @@ def well_invasion(
     height: float = 1.0,
     pressure: float | None = None,
     radius: float | None = None,
-    **cake: Any,
+    api_filtrate: float | None = None,
 ) -> dict[str, Any]:
     """A well drilled through the specimen's sand with its mud, open hole and perforated.
+
+    The skin of the damage is integrated over the depth (`skin`) and by Hawkins; the lost flow is
+    the share of the productivity; the skin of the cake counts while the cake stands.
 
     Args:
         source: a run, its folder, or the folder of an ensemble.
@@ -130,12 +122,7 @@ def well_invasion(
         height: m, of the well.
         pressure: Pa, overbalance; without it that of the case.
         radius: m, of the well; without it that of the case, or 108 mm.
-        cake: as of `core_flood`.
-
-    Returns:
-        As `core_flood`: `filtrate_m3`, `invasion_radius_m`, `skin` of the damage (integrated) and
-        `skin_hawkins`, `flow_lost` (share of the productivity), `skin_cake` while the cake
-        stands, the same `perforated`, and `k_over_k0` by depth.
+        api_filtrate: as of `core_flood`.
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
@@ -153,10 +140,10 @@ def well_invasion(
             raise CaseError(f"radius: {well:g} m, expected below the drainage radius, {outer:g} m")
         if not over:
             raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
-        drive, shots = Flood(3600 * hours, over), SHOTS * SHOT_LENGTH
+        drive, shots = model.Flood(3600 * hours, over), SHOTS * SHOT_LENGTH
         hole, made, loss = _around(medium, well, height, outer, drive)
         shot, _, of_shot = _around(medium, SHOT_RADIUS, height * shots, outer, drive)
-        skins = damage_skin(hole, loss), damage_skin(shot, of_shot) / shots
+        skins = model.damage_skin(hole, loss), model.damage_skin(shot, of_shot) / shots
         lost = [flow_lost(skin, well=well, drainage=outer) for skin in skins]
         zone = int(np.max(np.flatnonzero(1 / loss <= 1 - DAMAGED_FROM) + 1, initial=0))
         rings, depth = np.diff(hole.reach(hole.edges))[:zone], float(hole.edges[zone])
@@ -164,10 +151,9 @@ def well_invasion(
         found = _common(medium, hole, made)
         pores, filtrate = math.pi * medium.porosity * height, found["filtrate_m3"]
         if medium.cake_permeability:
-            thin = cake_skin("inward", found["cake_thickness_m"], well)
+            thin = model.cake_skin("inward", found["cake_thickness_m"], well)
             found["skin_cake"] = thin * medium.permeability / medium.cake_permeability
         left = np.interp(DEPTHS, (hole.edges[:-1] + hole.edges[1:]) / 2, 1 / loss, right=1.0)
-        table = pd.DataFrame({"depth_m": DEPTHS, "k_over_k0": left})
         return {
             **found,
             "invasion_radius_m": math.sqrt(well**2 + filtrate / pores),
@@ -176,10 +162,10 @@ def well_invasion(
             "damaged_depth_m": depth,
             "flow_lost": lost[0],
             "perforated": {"skin": skins[1], "flow_lost": lost[1]},
-            "k_over_k0": table.to_dict("records"),
+            "k_over_k0": pd.DataFrame({"depth_m": DEPTHS, "k_over_k0": left}).to_dict("records"),
         }
 
-    found = _banded(source, drilled, shape="inward", **cake)
+    found = _banded(source, drilled, api_filtrate)
     shot = found["perforated"]
     words = [
         f"The damage is a skin of {with_band(found, 'skin')} and costs an open hole "
@@ -205,18 +191,18 @@ def keep(folder: Path, name: str, found: Mapping[str, Any], given: Mapping[str, 
 
 
 def _around(
-    medium: Medium, well: float, height: float, outer: float, drive: Flood
-) -> tuple[Column, March, np.ndarray]:
+    medium: model.Medium, well: float, height: float, outer: float, drive: model.Flood
+) -> tuple[model.Column, model.March, np.ndarray]:
     """The rock around a hole of radius `well` m as deep as fines get, its mud, and k0 / k (J,)."""
     slowest = min((one.rate for one in medium.mud if one.rate > 0), default=1.0)
-    edges = steep_grid(min(outer - well, 20 / slowest), CELLS, 1 / (_steepest(medium) + 1))
+    edges = model.steep_grid(min(outer - well, 20 / slowest), CELLS, 1 / (_steepest(medium) + 1))
     area = 2 * math.pi * well * height
-    column = Column(edges=edges, area=area, well=well, outer=outer - well)
-    made = march(column, medium, [drive])
+    column = model.Column(edges=edges, area=area, well=well, outer=outer - well)
+    made = model.march(column, medium, [drive])
     return column, made, medium.loss(made.end.deposit.sum(axis=0))
 
 
-def _steepest(medium: Medium) -> float:
+def _steepest(medium: model.Medium) -> float:
     """Rate of filtration at the face when it closes, 1/m."""
     return max(one.rate * (1 + max(one.growth, 0.0) * medium.closing) for one in medium.mud)
 
@@ -224,50 +210,52 @@ def _steepest(medium: Medium) -> float:
 _STOPPED = {
     "": "",
     "closed": "the numbers are those of the time when the face had the deposit of the run's end, "
-    "for no cake is known; give --cake-permeability or --api-filtrate",
+    "for no cake is known; give --api-filtrate",
     "full": "the cake of these fines alone fills the hole: the numbers are those of that time. "
     "A mud that has finer solids too holds back its filtrate; give --api-filtrate",
 }
 
 
-def _common(medium: Medium, column: Column, made: March) -> dict[str, Any]:
+def _common(medium: model.Medium, column: model.Column, made: model.March) -> dict[str, Any]:
     thick = made.end.cake.sum() / ((1 - medium.cake_porosity) * column.area)
     return {
         "time_s": float(made.time[-1]),
         "closed_at_s": made.closed_at,
         "filtrate_m3": float(made.filtrate[-1]),
         "cake_thickness_m": float(thick),
-        "deposit_m3": float(made.end.deposit.sum(axis=0) @ column.volume),
         "stopped": _STOPPED[made.stopped],
     }
+
+
+def _values(medium: model.Medium) -> dict[str, float | None]:
+    """The fitted numbers by name, SI; of several classes each with the name of its class."""
+    found = dict[str, float | None]()
+    for one in medium.mud:
+        end = f"_{one.name}" if len(medium.mud) > 1 else ""
+        found |= {f"rate_1_m{end}": one.rate, f"growth{end}": one.growth}
+    found |= {"closing_deposit": medium.closing, "damage": medium.damage}
+    return found | {"cake_permeability_m2": medium.cake_permeability}
 
 
 def _banded(
     source: str | Path | FinishedRun,
     by_model: Callable[[HandedUp], dict[str, Any]],
-    *,
-    shape: str = "linear",
-    cake_permeability: float | None = None,
-    api_filtrate: float | None = None,
+    api_filtrate: float | None,
 ) -> dict[str, Any]:
     """What the model gives for all that is handed up, with bands: of seeds, or of the fits."""
-    _above_zero(cake_permeability=cake_permeability, api_filtrate=api_filtrate)
-    many = []
-    for one in hand_up(source):
-        medium, known = one.medium, cake_permeability or one.medium.cake_permeability
-        if api_filtrate and not cake_permeability:
-            known = api_permeability(
-                api_filtrate,
-                viscosity=medium.viscosity,
-                solids=medium.solids,
-                porosity=medium.cake_porosity,
-            )
-        cake = replace(medium, cake_permeability=known, cake_shape=shape)
-        many.append(one._replace(medium=cake))
+    _above_zero(api_filtrate=api_filtrate)
+    many = [one._replace(medium=_caked(one.medium, api_filtrate)) for one in hand_up(source)]
     seeds = len({one.run.path for one in many})
-    found = _merged([by_model(one) | {"handed_up": one.values()} for one in many], seeds)
+    found = _merged([by_model(one) | {"handed_up": _values(one.medium)} for one in many], seeds)
     notes = [note for one in many for note in one.notes] + [found.pop("stopped")]
     return found | {"seeds": seeds, "warnings": [note for note in dict.fromkeys(notes) if note]}
+
+
+def _caked(mud: model.Medium, api_filtrate: float | None) -> model.Medium:
+    if api_filtrate is None:
+        return mud
+    given = {"viscosity": mud.viscosity, "solids": mud.solids, "porosity": mud.cake_porosity}
+    return replace(mud, cake_permeability=api_permeability(api_filtrate, **given))
 
 
 def _merged(trees: Sequence[Any], seeds: int) -> Any:

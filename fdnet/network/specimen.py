@@ -16,16 +16,7 @@ from fdnet.network.flow.sections import profile_edges, section_edges
 from fdnet.network.network import Network, build_network
 from fdnet.network.tessellation.delaunay import check_lengths
 from fdnet.network.tessellation.facets import LARGE_CELL, copies_of_cell
-from fdnet.spheres.geometry import (
-    Porosity,
-    inside_others,
-    max_overlap,
-    measure_porosity,
-    overlap_doubts,
-    repeated,
-    touching_pairs,
-    wrapped,
-)
+from fdnet.spheres import geometry
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, one_line, sides_of
 
 CONTACT_GAP = 0.01
@@ -81,7 +72,7 @@ def cake_of(spheres: Snapshot, periodic: Sequence[bool]) -> Snapshot:
     everything = spheres.where(spheres.position[:, 0] < low + reach)
     upstream = (everything.position[:, 0] < low) & (everything.kind == Kind.FINE)
     around = (False, bool(periodic[1]), bool(periodic[2]))
-    pair, _ = touching_pairs(everything, around, gap=CONTACT_GAP)
+    pair, _ = geometry.touching_pairs(everything, around, gap=CONTACT_GAP)
     count, loose = len(everything), upstream
     while loose.any():
         loose = upstream & (np.bincount(pair.ravel(), minlength=count) < HELD_BY)
@@ -151,9 +142,9 @@ def pack_doubts(spheres: Snapshot, axis: str, walls: str) -> Iterator[str]:
     periodic = sides_of(spheres, None)
     if walls == "no-slip":
         yield from _crossing(spheres, periodic, axis)
-    seen = spheres.where(~inside_others(spheres, periodic)[0])
-    of_fines = max_overlap(seen, periodic, only_fines=True)
-    yield from overlap_doubts(max_overlap(seen.grains(), periodic), of_fines)
+    seen = spheres.where(~geometry.inside_others(spheres, periodic)[0])
+    of_fines = geometry.max_overlap(seen, periodic, only_fines=True)
+    yield from geometry.overlap_doubts(geometry.max_overlap(seen.grains(), periodic), of_fines)
 
 
 def _crossing(spheres: Snapshot, periodic: tuple[bool, bool, bool], axis: str) -> Iterator[str]:
@@ -202,7 +193,7 @@ def kozeny(grains: Snapshot, porosity: float) -> float:
 def _walls_at_periodic_sides(grains: Snapshot, periodic: tuple[bool, bool, bool]) -> Iterator[str]:
     """A warning for each periodic axis along which the pack ends as at a wall: no grain crosses
     its sides, and far fewer neighbours meet across them than across any plane within."""
-    place = wrapped(grains.position, grains.box, periodic)
+    place = geometry.wrapped(grains.position, grains.box, periodic)
     reach, (low, high) = grains.radius[:, None] * (1.0 - PRESSED), grains.box.T
     clear = np.array(periodic) & np.all((place - reach >= low) & (place + reach <= high), axis=0)
     if not clear.any():
@@ -210,7 +201,7 @@ def _walls_at_periodic_sides(grains: Snapshot, periodic: tuple[bool, bool, bool]
     pairs = np.empty((0, 2), int)
     for gap in GAPS:
         if len(pairs) < len(grains) / 2:
-            pairs, _ = touching_pairs(grains, periodic, gap=gap)
+            pairs, _ = geometry.touching_pairs(grains, periodic, gap=gap)
     size = high - low
     apart = place[pairs[:, 0]] - place[pairs[:, 1]]
     inside = np.abs(apart - np.where(periodic, np.rint(apart / size) * size, 0.0))
@@ -280,7 +271,7 @@ class Specimen:
     """(S+1,) edges of the sections, m."""
     bins: Array
     """(B+1,) edges of the profile's bins, m."""
-    porosity: tuple[Porosity, Porosity]
+    porosity: tuple[geometry.Porosity, geometry.Porosity]
     """Porosity before and after, by depth."""
     depth: Array
     """(F,) depth of the fines centred in the box, m."""
@@ -335,7 +326,7 @@ def measure_specimen(
         if fines is not None and len(after) + len(fines) < LARGE_CELL:
             packs.append(after.joined(fines))
         copies = copies_of_cell(packs, periodic)
-        grains = repeated(before, copies), repeated(after, copies)
+        grains = geometry.repeated(before, copies), geometry.repeated(after, copies)
         first, *ended = (
             build_network(one, periodic=periodic, walls=choices.walls)
             for one in grains[: 1 + moved]
@@ -345,21 +336,21 @@ def measure_specimen(
     if fines is not None:
         with timed("occupancy"):
             occupancy = measure_occupancy(
-                network, repeated(fines, copies), overlap=choices.throat_overlap
+                network, geometry.repeated(fines, copies), overlap=choices.throat_overlap
             )
     bins = profile_edges(choices.profile_bin_m or first.grain_radius, box)
     cuts = np.unique(np.concatenate([edges, bins]))
     spheres = before if fines is None else after.joined(fines)
     with timed("porosity"):
-        clean = measure_porosity(before, periodic=periodic, edges=cuts)
+        clean = geometry.measure_porosity(before, periodic=periodic, edges=cuts)
         filled = clean
         if fines is not None:
-            filled = measure_porosity(spheres, periodic=periodic, edges=cuts)
+            filled = geometry.measure_porosity(spheres, periodic=periodic, edges=cuts)
     place = spheres.fines().position
     x, beyond = place[:, 0], (place < box[:, 0]) | (place > box[:, 1])
     return Specimen(
         grains=grains,
-        fines=None if fines is None else repeated(fines, copies),
+        fines=None if fines is None else geometry.repeated(fines, copies),
         copies=copies,
         inner_grains=given[0] - len(before),
         inner_fines=0 if fines is None else given[1] - len(fines),
@@ -454,10 +445,10 @@ def _without_inner(
     before: Snapshot, after: Snapshot, fines: Snapshot | None, periodic: tuple[bool, bool, bool]
 ) -> tuple[Snapshot, Snapshot, Snapshot | None]:
     """Grains before and after and fines that add to the solid."""
-    wholly = inside_others(before, periodic)[0]
+    wholly = geometry.inside_others(before, periodic)[0]
     if after is not before or fines is not None:
         together = after if fines is None else after.joined(fines)
-        later = inside_others(together, periodic)[0]
+        later = geometry.inside_others(together, periodic)[0]
         wholly &= later[: len(after)]
         fines = None if fines is None else fines.where(~later[len(after) :])
     return before.where(~wholly), after.where(~wholly), fines

@@ -114,7 +114,7 @@ def class_model(
         sieve=sieve,
         classes=classes,
         course=_course(case, scales, permeability, sieve),
-        flow=flows_through(network, sieve, clean),
+        flow=flows_through(network, sieve, clean, first),
         parcel=case.fines.mean_volume_m3 if case.with_classes else 0.0,
     )
 

@@ -12,18 +12,11 @@ from fdnet.dem.invasion import invade, invasion_so_far
 from fdnet.dem.packing import check_radii, make_pack
 from fdnet.errors import CaseError, Doubt
 from fdnet.names import LIGGGHTS_STAGES
+from fdnet.run import records
 from fdnet.run.by_classes import class_model, write_class_invasion
 from fdnet.run.fluid import fluid_of
 from fdnet.run.folder import START_OVER, check_files, may_be_gone, read_record
 from fdnet.run.progress import Forecast, Progress
-from fdnet.run.records import (
-    PACK_DUMP,
-    FinishedInvasion,
-    Session,
-    invade_record,
-    pack_record,
-    take_pack,
-)
 from fdnet.scales.cost import expected_duration
 from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES
 from fdnet.scales.scales import InvasionScales, invasion_scales
@@ -31,22 +24,22 @@ from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Snapshot
 
 
-def pack_stage(session: Session) -> None:
+def pack_stage(session: records.Session) -> None:
     """Make the pack, unless it is made. Raises what `make_pack` raises."""
     if is_done(session, "pack"):
         return
     if session.options.pack_from is not None:
-        take_pack(session, session.options.pack_from)
+        records.take_pack(session, session.options.pack_from)
         return
     case, folder = session.case, session.path / "pack"
     expected = PACK_STAGES * PACK_STAGE_STEPS + PACK_RELAX_STEPS // 2
     progress = Progress("pack", Forecast(expected=expected), show=session.options.show_progress)
     with session.timed("pack"), progress:
         pack = make_pack(case, folder, session.launch(progress))
-    session.finish("pack", pack_record(pack, folder, assumed=session.scales.porosity))
+    session.finish("pack", records.pack_record(pack, folder, assumed=session.scales.porosity))
 
 
-def invade_stage(session: Session, case: InvasionCase) -> None:
+def invade_stage(session: records.Session, case: InvasionCase) -> None:
     """Drive the fines in, unless that is done. Raises what `invade` raises."""
     if is_done(session, "invade"):
         return
@@ -62,7 +55,7 @@ def invade_stage(session: Session, case: InvasionCase) -> None:
     with session.timed("invade"), progress:
         launch, fluid = session.launch(progress), fluid_of(case, scales, grains)
         result = invade(case, scales, grains, folder, launch, fluid=fluid)
-    session.finish("invade", invade_record(case, result, folder))
+    session.finish("invade", records.invade_record(case, result, folder))
 
 
 def _forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
@@ -77,7 +70,7 @@ def _forecast(case: InvasionCase, scales: InvasionScales) -> Forecast:
     )
 
 
-def invasion_record(session: Session, case: InvasionCase) -> dict[str, Any]:
+def invasion_record(session: records.Session, case: InvasionCase) -> dict[str, Any]:
     """The record of the invasion; of one that was cut, what it is at its last whole checkpoint.
 
     That one has the key `share_done`: time done over that which it is expected to take. Raises
@@ -95,10 +88,10 @@ def invasion_record(session: Session, case: InvasionCase) -> dict[str, Any]:
         (row.chunk * scales.checkpoint_steps, row.invaded + row.passed) for row in result.history
     ]
     share = seen[-1][0] / _forecast(case, scales).end(seen)
-    return invade_record(case, result, folder) | {"share_done": share}
+    return records.invade_record(case, result, folder) | {"share_done": share}
 
 
-def is_done(session: Session, stage: str) -> bool:
+def is_done(session: records.Session, stage: str) -> bool:
     """Whether a stage of this case is done, its files as they were.
 
     Raises CaseError when it belongs to another case or a file of it is not what it made.
@@ -124,7 +117,7 @@ def packed_grains(folder: Path, case: Case) -> Snapshot:
     Raises DumpError when the dump cannot be read or holds other radii than the case asks for,
     CaseError when it is not what the stage made.
     """
-    dump = folder / "pack" / PACK_DUMP
+    dump = folder / "pack" / records.PACK_DUMP
     frame = read_frame(dump)
     check_files(folder / "pack", read_record(folder, "pack") or {}, START_OVER)
     grains = snapshot_of(frame, case, time_s=0.0)
@@ -133,8 +126,8 @@ def packed_grains(folder: Path, case: Case) -> Snapshot:
 
 
 def invaded(
-    session: Session, case: InvasionCase, grains: Snapshot, record: Mapping[str, Any]
-) -> FinishedInvasion:
+    session: records.Session, case: InvasionCase, grains: Snapshot, record: Mapping[str, Any]
+) -> records.FinishedInvasion:
     """The invasion of this `record`, as it is on disk.
 
     Raises CaseError when a file is not what the stage made, DumpError or LiggghtsError when one
@@ -143,7 +136,7 @@ def invaded(
     folder, scales = session.path / "invade", invasion_scales(case)
     check_files(folder, record, START_OVER, may_lack=may_be_gone)
     history = tuple(row for row in read_history(folder) if row.step <= record["steps"])
-    return FinishedInvasion(
+    return records.FinishedInvasion(
         case=case,
         scales=scales,
         history=history,
@@ -152,7 +145,7 @@ def invaded(
     )
 
 
-def file_warnings(session: Session) -> Iterator[str]:
+def file_warnings(session: records.Session) -> Iterator[str]:
     """Dumps that are gone, one sentence a stage."""
     for stage in LIGGGHTS_STAGES:
         record = session.folder.record(stage) if stage in session.case.stages else None

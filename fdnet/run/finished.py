@@ -17,15 +17,8 @@ from fdnet.names import ALL_SPHERES
 from fdnet.network.laws.named import LAWS
 from fdnet.network.network import Network, build_network
 from fdnet.network.states import all_conductances
+from fdnet.report import tables
 from fdnet.report.figures import fill_depth, shown
-from fdnet.report.tables import (
-    LAYER_COLUMNS,
-    MILLIDARCY,
-    empty_table,
-    read_summary,
-    read_table,
-    to_openpnm,
-)
 from fdnet.report.text import text_lines
 from fdnet.run.folder import ANALYSE_AGAIN, START_OVER, check_one, finished_manifest
 from fdnet.spheres.readers import read_spheres
@@ -67,7 +60,7 @@ class FinishedRun:
         in_m2 = f"{name.removesuffix('_mD')}_m2"
         if name.startswith("k_") and name.endswith("_mD") and in_m2 in self.summary:
             k = self.summary[in_m2]
-            return None if k is None else k / MILLIDARCY
+            return None if k is None else k / tables.MILLIDARCY
         near = get_close_matches(name, dir(self), 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise AttributeError(f"a run of fdnet has no {name!r}{hint}")
@@ -102,7 +95,7 @@ class FinishedRun:
     @cached_property
     def summary(self) -> Mapping[str, Any]:
         """The numbers of summary.json, SI; a length is in m, a permeability in m2."""
-        return self._read("summary.json", read_summary)
+        return self._read("summary.json", tables.read_summary)
 
     @cached_property
     def sections(self) -> "pd.DataFrame":
@@ -122,7 +115,7 @@ class FinishedRun:
         """
         if "layers.csv" in self.manifest["files"]:
             return self._table("layers")
-        return empty_table(LAYER_COLUMNS)
+        return tables.empty_table(tables.LAYER_COLUMNS)
 
     @cached_property
     def pores(self) -> "pd.DataFrame":
@@ -142,9 +135,9 @@ class FinishedRun:
         invade/history.csv. A run without fines has no history: the table has no rows.
         """
         if not isinstance(self.case, InvasionCase):
-            return empty_table(["time_s", *HISTORY_COLUMNS])
+            return tables.empty_table(["time_s", *HISTORY_COLUMNS])
         check_one(self.path / "invade", self.manifest["invade"], "history.csv", START_OVER)
-        counts = read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
+        counts = tables.read_table(self.path / "invade" / "history.csv", HISTORY_COLUMNS)
         return self._table("history").merge(counts, on="step", how="left")
 
     def spheres(self, state: State = "damaged") -> Snapshot:
@@ -187,11 +180,11 @@ class FinishedRun:
         else:
             network = self.network()
             conductance = self.throats[f"conductance_{state}_m3"].to_numpy()
-        return to_openpnm(network, conductance, viscosity=self.case.fluid.viscosity_Pa_s)
+        return tables.to_openpnm(network, conductance, viscosity=self.case.fluid.viscosity_Pa_s)
 
     def _table(self, name: str) -> "pd.DataFrame":
         check_one(self.path, self.manifest, f"{name}.csv", ANALYSE_AGAIN)
-        return read_table(self.path / f"{name}.csv")
+        return tables.read_table(self.path / f"{name}.csv")
 
     def _read(self, name: str, read: Callable[[Path], Any]) -> Any:
         """A file of the run as `read` gives it; CaseError where the run wrote another one."""

@@ -29,16 +29,8 @@ from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
+from fdnet.run import network_flow
 from fdnet.run.cake import Standing, standing_cake
-from fdnet.run.network_flow import (
-    RENEWED,
-    Carried,
-    PackFlow,
-    Renewal,
-    on_each_fine,
-    pack_flow,
-    placed,
-)
 from fdnet.scales.drag import crowd_drag_factor
 from fdnet.scales.flow import darcy_through, path_of
 from fdnet.scales.scales import InvasionScales
@@ -207,7 +199,7 @@ class NetworkFluid:
     scales: InvasionScales
     grains: Snapshot  # of the pack, fixed
     standing: float = STANDING
-    renewed: float = RENEWED
+    renewed: float = network_flow.RENEWED
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -222,14 +214,14 @@ class NetworkFluid:
         )
 
     @cached_property
-    def pack(self) -> PackFlow:
+    def pack(self) -> network_flow.PackFlow:
         """The intact pack."""
-        return pack_flow(self.grains, self.case.periodic, self.case.analysis.walls)
+        return network_flow.pack_flow(self.grains, self.case.periodic, self.case.analysis.walls)
 
     @cached_property
-    def renewal(self) -> Renewal:
+    def renewal(self) -> network_flow.Renewal:
         """The damaged pack, from one update to the next."""
-        return Renewal(self.pack, renewed=self.renewed)
+        return network_flow.Renewal(self.pack, renewed=self.renewed)
 
     @cached_property
     def finer(self) -> FinerClasses | None:
@@ -279,7 +271,7 @@ class NetworkFluid:
         fines, pack, scales = spheres.fines(), self.pack, self.scales
         depth, lone = fines.position[:, 0], scales.push.coefficient * fines.radius
         within = (depth >= 0) & (depth < pack.length)
-        measured, before = placed(fines), self._before(moment)
+        measured, before = network_flow.placed(fines), self._before(moment)
         intact = pack.shape.at(measured.position)
         # a fine that comes out of a throat has the speed that it was given, slow for its place
         usual = before * _speed(intact)
@@ -305,7 +297,7 @@ class NetworkFluid:
         pressed = np.zeros((len(fines), 3))
         order = np.argsort(fines.id)
         rows = order[np.searchsorted(fines.id[order], deposit.fines.id)]
-        pressed[rows] = on_each_fine(carried.pressed, deposit)
+        pressed[rows] = network_flow.on_each_fine(carried.pressed, deposit)
         held = standing & within & np.any(pressed != 0.0, axis=1)
         cake = scales.push.coefficient / (6.0 * np.pi) * float(stack.resistance.sum())
         # the pack's own flow knows no cake: the forces on its fines add up to its pressure drop
@@ -391,7 +383,9 @@ class NetworkFluid:
         """Superficial velocity up to this moment, m/s."""
         return self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
 
-    def _ahead(self, fines: Snapshot, rate: Array, carried: Carried, moment: Moment) -> Array:
+    def _ahead(
+        self, fines: Snapshot, rate: Array, carried: network_flow.Carried, moment: Moment
+    ) -> Array:
         """Velocity (N, 3) of the fluid over U on the way of `fines` that move.
 
         Drag takes up their slip at the `rate` (N,) 1/s.

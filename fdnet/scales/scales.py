@@ -6,22 +6,7 @@ from dataclasses import dataclass, fields, replace
 from fdnet.case.case import Case, InvasionCase
 from fdnet.case.tables import CleanUp
 from fdnet.errors import CaseError, Doubt
-from fdnet.scales.clock import (
-    STARTING,
-    chunk_refreshes,
-    deposit_pressure,
-    drag_warnings,
-    drive_in,
-    hold_steps,
-    plug_warnings,
-    relaxation_times,
-    rises,
-    slab_of,
-    slab_warnings,
-    stiff_enough,
-    stop_times,
-    time_step,
-)
+from fdnet.scales import clock
 from fdnet.scales.contacts import (
     Contact,
     Sticking,
@@ -100,13 +85,13 @@ def scales_of(case: Case) -> Scales:
     contacts shut, or when a formula overflows.
     """
     try:
-        rising, case = rises(case), stiff_enough(case)
+        rising, case = clock.rises(case), clock.stiff_enough(case)
         porosity = target_porosity(case)
         flow = velocity_of(case, porosity)
         shared = _shared(case, porosity, flow)
         if not isinstance(case, InvasionCase):
             return shared
-        return _invasion(case, flow, shared, chain=STARTING if rising else 1.0)
+        return _invasion(case, flow, shared, chain=clock.STARTING if rising else 1.0)
     except (OverflowError, ZeroDivisionError) as error:
         raise CaseError(
             f"case {case.name}: a formula leaves the range of numbers ({error}); check units and "
@@ -146,7 +131,7 @@ def stiffened(case: InvasionCase, scales: InvasionScales, steps: int) -> Invasio
     """The scales of a chunk in `steps` steps: the stiffness goes with their square."""
     if steps == scales.checkpoint_steps:
         return scales
-    run, ratio = stiff_enough(case).run, steps / scales.checkpoint_steps
+    run, ratio = clock.stiff_enough(case).run, steps / scales.checkpoint_steps
     assert not isinstance(run.stiffness_N_m, str)
     run = run.model_copy(update={"stiffness_N_m": run.stiffness_N_m * ratio**2})
     stiff = case.model_copy(update={"run": run})
@@ -166,19 +151,19 @@ def _invasion(
     small, large = fines.radius_range_m
     speed, viscosity = flow.interstitial, fluid.viscosity_Pa_s
     throat = 2 * large / throat_width(shared.porosity, flow.permeability)
-    slab, relaxation = slab_of(case, throat), relaxation_times(case)
-    drive = drive_in(case, flow)
+    slab, relaxation = clock.slab_of(case, throat), clock.relaxation_times(case)
+    drive = clock.drive_in(case, flow)
     push = push_of(case, drive.velocity, flow.pressure_gradient, factor=drive.factor)
     upstream = flow.darcy * drive.factor if case.drag.upstream == "darcy" else drive.velocity
     shortest = relaxation[0] * push.relaxation_share(small)
-    times = stop_times(case, slab, drive, upstream=upstream)
+    times = clock.stop_times(case, slab, drive, upstream=upstream)
     step, hold, chunk_steps = times.chunk, 1, 1
     if not case.by_classes:  # which has no steps of LIGGGHTS, and no limits on them
-        step = time_step(case, shared.contacts, shortest)
-        hold = hold_steps(case, step, shortest, times.chunk)
-        chunk_steps = chunk_refreshes(case, times.chunk, step * hold) * hold
+        step = clock.time_step(case, shared.contacts, shortest)
+        hold = clock.hold_steps(case, step, shortest, times.chunk)
+        chunk_steps = clock.chunk_refreshes(case, times.chunk, step * hold) * hold
     contact = shared.contacts["grain-fine"]
-    borne = deposit_pressure(case, flow, shared.porosity)
+    borne = clock.deposit_pressure(case, flow, shared.porosity)
     overlaps = overlaps_of(case, contact, flow, drive, shared.porosity, chain * borne)
     sticking = sticking_of(case, contact, push, step)
     if chunk_steps > MOST_STEPS:
@@ -199,9 +184,9 @@ def _invasion(
             *throat_warnings(case, throat),
             *overlap_warnings(case, overlaps),
             *cohesion_warnings(case, contact),
-            *slab_warnings(case, slab),
-            *drag_warnings(case, hold * step / shortest),
-            *plug_warnings(case, times.plug, drive, upstream),
+            *clock.slab_warnings(case, slab),
+            *clock.drag_warnings(case, hold * step / shortest),
+            *clock.plug_warnings(case, times.plug, drive, upstream),
             *sticking_warnings(sticking),
         ]
     return InvasionScales(
@@ -296,10 +281,10 @@ def _at_drawdown(case: InvasionCase, choices: CleanUp) -> InvasionCase:
     if asked.drive_velocity_m_s != "fluid":
         porosity = target_porosity(case)
         before, flow = velocity_of(case, porosity), velocity_of(turned, porosity)
-        driven = flow.interstitial * drive_in(case, before).factor
+        driven = flow.interstitial * clock.drive_in(case, before).factor
         if asked.drive_velocity_m_s == "auto":
-            driven = min(driven, drive_in(turned, flow).velocity)
+            driven = min(driven, clock.drive_in(turned, flow).velocity)
         drive = driven if driven > flow.interstitial else "fluid"
         drag = asked.model_copy(update={"drive_velocity_m_s": drive})
         turned = turned.model_copy(update={"drag": drag})
-    return stiff_enough(turned, start=False)
+    return clock.stiff_enough(turned, start=False)

@@ -56,7 +56,7 @@ def both(run: FinishedRun) -> dict[str, Any]:
     counts = model.counted(end.by_class[-1])
     x = spheres_at_the_end(case, model, end, counts).position[:, 0]
     edges = np.array([0.0, min(FIRST, case.size_m[0])])
-    clean, flow = model.flow(np.ones_like(end.kept)).flow, model.flow(end.kept).flow
+    clean, flow = (model.flow(one, None).flow for one in (np.ones_like(end.kept), end.kept))
     intact = inplace_permeability(model.network, clean, edges, model.sieve.halves)
     damaged = inplace_permeability(model.network, flow, edges, model.sieve.halves / end.kept)
     passed, number = int(counts.passed.sum()), int(counts.invaded.sum())

@@ -85,7 +85,6 @@ def test_a_bad_value_is_named_with_its_path():
         ("clean_up", {"drawdown_MPa": 1.0, "quiet_ms": 1.0}, "give clean_up.duration_ms, or"),
         ("run", {"max_hours": 0.0}, "run.max_hours: 0.0"),
         ("run", {"max_overlap": 1.0}, "run.max_overlap: 1.0"),
-        ("run", {"on_overlap": "stopp"}, "run.on_overlap: 'stopp'"),
         ("run", {"stiffness_N_m": "nominel"}, "run.stiffness_N_m: 'nominel'"),
         ("analysis", {"law": "darcy"}, "analysis.law: 'darcy'"),
         ("analysis", {"damage_law": "kozeny"}, "'kozeny' is no longer there; take 'section-arc"),
@@ -133,7 +132,6 @@ def test_stages_depend_only_on_their_own_keys():
         "seed=2": {"pack", "invade", "analyse"},
         "run.max_hours=1.0": set(),
         "run.max_overlap=0.1": set(),
-        "run.on_overlap=stop": set(),
     }.items():
         case, other = tiny(), tiny(key)
         moved = {one for one in DIGESTS if other.digest(one) != case.digest(one)}

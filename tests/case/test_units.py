@@ -87,7 +87,8 @@ def test_a_case_with_units_is_the_case_in_the_units_of_the_keys():
 
 def test_the_texts_that_runs_of_before_kept_are_passed_over(tmp_path):
     case = case_from(PLAIN)
-    text = f'{case.toml()}[given]\n"fluid.viscosity" = "10 cP"\n'
+    text = case.toml().replace("[run]", '[run]\non_overlap = "stop"')
+    text += '[given]\n"fluid.viscosity" = "10 cP"\n'
     (tmp_path / "case.toml").write_text(text)
     assert recorded_case(tmp_path / "case.toml") == case
     assert case.same_specimen(text.encode())

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fdnet.errors import FlowError
-from fdnet.network.flow.solver import balance_links, groups, winding_groups
+from fdnet.network.flow.solver import Balance, balance_links, groups, winding_groups
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, frozen, one_line
 
@@ -162,6 +162,7 @@ class Flow:
             where one throat spends nearly all (the participation number; Bell and Dean 1970,
             Discuss. Faraday Soc. 50, 55). 0 without flow.
         reason: why the inflow is 0; empty where there is flow.
+        balance: that of its links, from which a solve with like conductances can start.
     """
 
     pore_pressure: Array
@@ -173,12 +174,17 @@ class Flow:
     inflow: float = 0.0
     carrying_throats: float = 0.0
     reason: str = ""
+    balance: Balance | None = None
 
     __repr__ = one_line
 
 
 def solve_flow(
-    network: Network, conductance: Array, *, span: tuple[float, float] | None = None
+    network: Network,
+    conductance: Array,
+    *,
+    span: tuple[float, float] | None = None,
+    near: Flow | None = None,
 ) -> Flow:
     """Steady flow along x through the network, by the mass balance of each pore.
 
@@ -186,6 +192,7 @@ def solve_flow(
         network: the pores and throats.
         conductance: (T,) conductance of each throat, m3 (flux times viscosity over pressure drop).
         span: bounds (low, high) of a slab that is cut out, m; the whole box without it.
+        near: a flow of this span through the same open throats, from which the solve starts.
 
     Returns:
         Pressures over the pressure drop and fluxes (m3). No open path is no error: the inflow is 0
@@ -230,7 +237,8 @@ def solve_flow(
             isolated_pores=isolated,
             reason=reason,
         )
-    solved = balance_links(node, links.conductance, jump, int(free.sum()) + (not around))
+    count, start = int(free.sum()) + (not around), None if near is None else near.balance
+    solved = balance_links(node, links.conductance, jump, count, near=start)
     pressure[free], flux = solved.pressure[0 if around else 1 :], solved.flux
     if around:
         inflow, other = float(flux @ jump), float(np.sum(flux**2 / links.conductance))
@@ -247,6 +255,7 @@ def solve_flow(
         mass_balance=abs(inflow - other) / inflow if inflow > 0 else np.inf,
         isolated_pores=isolated,
         carrying_throats=float(energy.sum() ** 2 / np.sum(energy**2)),
+        balance=solved,
     )
     _check(flow, bounds)
     return flow

@@ -167,7 +167,10 @@ def multigrid(matrix: sparse.csr_matrix) -> Solve:
 
 
 def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
-    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner."""
+    """One symmetric V-cycle of classical multigrid (Ruge and Stuben 1987) as a preconditioner.
+
+    That of pyamg itself takes norms beside, by BLAS on all cores, which nobody reads.
+    """
     hierarchy = pyamg.ruge_stuben_solver(
         matrix,
         strength=("classical", {"theta": STRENGTH}),
@@ -177,7 +180,16 @@ def ruge_stuben(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
         max_coarse=10,
         coarse_solver="splu",
     )
-    cycle: Callable[[Array], Array] = hierarchy.aspreconditioner(cycle="V").matvec
+
+    def cycle(source: Array, level: int = 0) -> Array:
+        here, solution = hierarchy.levels[level], np.zeros_like(source)
+        if level == len(hierarchy.levels) - 1:
+            return np.asarray(hierarchy.coarse_solver(here.A, source))
+        here.presmoother(here.A, solution, source)
+        solution += here.P @ cycle(here.R @ (source - here.A @ solution), level + 1)
+        here.postsmoother(here.A, solution, source)
+        return solution
+
     return cycle
 
 
@@ -312,18 +324,23 @@ class Balance(NamedTuple):
     """(n,) over the unit of the jumps."""
     flux: Array
     """(K,) from the first to the second end, in units of conductance times jump."""
+    drop: Array
+    """(K,) of the pressure along the links, in units of the jumps."""
     defect: float
     """Sum of the imbalances of the nodes over the throughput; it bounds its relative error."""
     method: str
     """How the system was solved."""
 
 
-def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> Balance:
+def balance_links(
+    ends: Array, conductance: Array, jump: Array, count: int, *, near: Balance | None = None
+) -> Balance:
     """Balance of `count` nodes, every one of which must be in a group that winds.
 
     Links have the `ends` (K, 2), the `conductance` (K,) above 0 and the `jump` (K,). What the
     fluxes lack in balance is solved for again, until the defect is `SETTLED`. Fluxes add up by
     increments, never as differences of nearly equal pressures. The caller judges the defect.
+    The solve starts from `near`, the balance of the same links with other conductances.
     """
     conductance = held_conductance(ends, conductance, jump, count)
     free = np.ones(count, bool)
@@ -335,6 +352,9 @@ def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> B
     inner = np.all(free[ends], axis=1)
     balances = Balances(index[ends[inner]], conductance[inner], tied)
     pressure, flux, defect, allowed = np.zeros(count), conductance * jump, np.inf, None
+    if near is not None:
+        pressure, flux = near.pressure, conductance * near.drop
+        allowed = 0.3 * SETTLED * abs(float(flux @ jump))
     for _ in range(MOST_SWEEPS):
         step, before = np.zeros(count), defect
         step[free] = balances.solve(-_net(ends, flux, count)[free], imbalance=allowed)
@@ -345,7 +365,7 @@ def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> B
         allowed = 0.3 * SETTLED * abs(throughput)
         if defect <= SETTLED or not defect < 0.7 * before:
             break
-    return Balance(pressure, flux, defect, balances.method)
+    return Balance(pressure, flux, flux / conductance, defect, balances.method)
 
 
 def held_conductance(ends: Array, conductance: Array, jump: Array, count: int) -> Array:
