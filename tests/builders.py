@@ -22,13 +22,8 @@ TINY: dict[str, Any] = {
     "grains": {"radius_mm": 0.25, "count": 66},
     "fines": {"radius_mm": 0.05, "count": 300, "supply": "slab"},
     "fluid": {"darcy_law": "darcy"},
-    "drag": {
-        "field": "uniform",
-        "inertia": "none",
-        "scheme": "held",
-        "upstream": "interstitial",
-        "pressure_gradient": False,
-    },
+    "drag": {"field": "uniform", "inertia": "none", "scheme": "held"}
+    | {"upstream": "interstitial", "pressure_gradient": False},
     "contact": {"restitution": "dry"},
     "run": {"time_step_factor": 0.1, "stiffness_N_m": 1e4, "plug_rate": 0.0},
     "analysis": {"sections": 3},
@@ -50,19 +45,10 @@ def resting_spheres(
 
 def followed(*more, way="fluid.velocity_m_s=5.0"):
     """A flow that follows its deposit: 15 grains, 150 fines, five checkpoints with updates."""
-    return tiny(
-        'drag={field = "network"}',
-        way,
-        "run.time_step_factor=0.2",
-        "box.sides=periodic",
-        "box.size_mm=[1.6,1.0,1.0]",
-        "grains.count=15",
-        "fines.count=150",
-        "fines.concentration=0.2",
-        "run.cap_ms=0.5",
-        "run.checkpoint_ms=0.1",
-        *more,
-    )
+    spheres = ("grains.count=15", "fines.count=150", "fines.concentration=0.2")
+    box = ("box.sides=periodic", "box.size_mm=[1.6,1.0,1.0]")
+    times = ("run.time_step_factor=0.2", "run.cap_ms=0.5", "run.checkpoint_ms=0.1")
+    return tiny('drag={field = "network"}', way, *box, *spheres, *times, *more)
 
 
 def answer(capsys: Any, *arguments: object) -> tuple[int, str, str]:

@@ -21,11 +21,7 @@ _approx = pytest.approx
 
 
 def _approx_relative(expected: Any, rel: Any = None, abs: Any = None, nan_ok: bool = False) -> Any:
-    """pytest.approx whose relative tolerance stands alone.
-
-    pytest adds an absolute tolerance of 1e-12 to every relative one. A permeability of 1e-11 m2
-    or a flux in m3/s would then pass with any error.
-    """
+    """pytest.approx without its own absolute tolerance: 1e-12 is a tenth of a permeability."""
     return _approx(expected, rel, 0.0 if rel is not None and abs is None else abs, nan_ok)
 
 

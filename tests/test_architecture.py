@@ -13,31 +13,19 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
 import count
 
 LAYERS = [
-    ["errors", "names"],
-    ["files"],
-    ["sizes", "statistics"],
-    ["spheres", "case"],
-    ["scales", "network"],
-    ["mechanics", "classes"],
-    ["dem", "report"],
-    ["run"],
-    ["campaign", "formation"],
-    ["commands"],
-    ["cli"],
-    ["__main__"],
+    *(["errors", "names"], ["files"], ["sizes", "statistics"], ["spheres", "case"]),
+    *(["scales", "network"], ["mechanics", "classes"], ["dem", "report"], ["run"]),
+    *(["campaign", "formation"], ["commands"], ["cli"], ["__main__"]),
 ]
 """Rooms of the package from the bottom up; a room imports from lower lines only."""
-
 NETWORK_LAYERS = [
     *(["geometry", "compiled"], ["stokes"], ["field"], ["tessellation"], ["network"], ["nodes"]),
     *(["fines", "flow"], ["laws", "specimen"], ["states"], ["permeability"], ["warm_up"]),
 ]
-FORMATION_LAYERS = [["model"], ["handed_up"], ["scale_up"]]
-CAMPAIGN_LAYERS = [["plan"], ["engine", "result"], ["page"], ["api"]]
 ROOMS = {
     "fdnet": LAYERS,
-    "fdnet.campaign": CAMPAIGN_LAYERS,
-    "fdnet.formation": FORMATION_LAYERS,
+    "fdnet.campaign": [["plan"], ["engine", "result"], ["page"], ["api"]],
+    "fdnet.formation": [["model"], ["handed_up"], ["scale_up"]],
     "fdnet.network": NETWORK_LAYERS,
 }
 DOORS = {

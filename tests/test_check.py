@@ -123,8 +123,7 @@ def test_what_check_finds_stands_in_summary_and_report(finished):
     case = fdnet.read_case(finished.path / "case.toml")
     odd = [one.sentence for one in checked(case, scales_of(case)).findings]
     assert odd[0].startswith("box.size_mm: the specimen is 3.2 mean grains wide")
-    warnings = finished.summary["warnings"]
-    assert set(odd) <= set(warnings)
+    assert set(odd) <= set(finished.summary["warnings"])
     report = (finished.path / "report.html").read_text(encoding="utf-8")
     assert "the specimen is 3.2 mean grains wide" in report
 

@@ -6,34 +6,24 @@ import subprocess
 import sys
 
 import pytest
+from builders import answer
 
-from fdnet.cli import FORMER, _parser, commands_of, main
+from fdnet.cli import FORMER, _parser, commands_of
 
-LISTED = (
-    *("init", "run", "check", "permeability", "stokes"),
-    *("movie", "mechanics", "ensemble", "sweep", "compare", "core", "well"),
-)
-
-
-def ended(arguments: list[str]) -> int:
-    with pytest.raises(SystemExit) as end:
-        main(arguments)
-    return int(end.value.code or 0)
+LISTED = "init run check permeability stokes movie mechanics ensemble sweep compare core well"
 
 
 def test_fdnet_alone_lists_twelve_commands(capsys):
-    assert main([]) == 0
-    alone = capsys.readouterr().out
-    assert ended(["--help"]) == 0
-    assert capsys.readouterr().out == alone
-    assert tuple(re.findall(r"^    (\w+)(?: |$)", alone, re.M)) == LISTED
-    assert set(commands_of(_parser())) == {*LISTED, "render"}
+    _, alone, _ = answer(capsys)
+    assert answer(capsys, "--help") == (0, alone, "")
+    assert re.findall(r"^    (\w+)(?: |$)", alone, re.M) == LISTED.split()
+    assert set(commands_of(_parser())) == {*LISTED.split(), "render"}
 
 
 def test_every_command_has_a_sentence_an_example_and_options_in_groups(capsys):
     for name, parser in commands_of(_parser()).items():
-        assert ended([name, "--help"]) == 0
-        text = capsys.readouterr().out
+        code, text, _ = answer(capsys, name, "--help")
+        assert code == 0
         assert re.search(r"^[A-Z].*\.$", text, re.M), name
         assert f"\n  fdnet {name} " in text.partition("example")[2], name
         own = text.partition("\noptions:\n")[2].partition("\n\n")[0]
@@ -54,9 +44,8 @@ def test_every_command_has_a_sentence_an_example_and_options_in_groups(capsys):
     ],
 )
 def test_a_slip_is_one_line_that_names_what_was_meant(arguments, said, capsys):
-    assert ended(arguments) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert said in line
+    code, _, error = answer(capsys, *arguments)
+    assert (code, error.count("\n"), said in error) == (2, 1, True), error
 
 
 def test_a_shell_completes_commands_options_and_choices():
@@ -82,23 +71,19 @@ def test_a_shell_completes_commands_options_and_choices():
 
 def test_a_dry_run_prints_the_scales_and_writes_nothing(tmp_path, root, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    case = str(root / "cases" / "quick.toml")
-    assert main(["run", case, "--dry-run"]) == 0
-    dry = capsys.readouterr().out
-    assert not list(tmp_path.iterdir())
-    assert main(["render", case, "--out", "decks"]) == 0
-    assert capsys.readouterr().out.startswith(dry)
-    assert main(["run", case, "--dry-run", "--set", "run.max_hours=1e-6"]) == 2
-    assert "fdnet run refuses this case" in capsys.readouterr().err
+    case = root / "cases" / "quick.toml"
+    code, dry, _ = answer(capsys, "run", case, "--dry-run")
+    assert (code, list(tmp_path.iterdir())) == (0, [])
+    code, rendered, _ = answer(capsys, "render", case, "--out", "decks")
+    assert (code, rendered.startswith(dry)) == (0, True)
+    code, _, error = answer(capsys, "run", case, "--dry-run", "--set", "run.max_hours=1e-6")
+    assert (code, "fdnet run refuses this case" in error) == (2, True)
 
 
 def test_strict_ends_with_2_where_anything_is_odd(root, capsys):
-    case = str(root / "cases" / "quick" / "specimen5.toml")
-    assert main(["check", case]) == 0
-    said = capsys.readouterr()
-    assert main(["check", case, "--strict"]) == 2
-    strict = capsys.readouterr()
-    assert strict.out == said.out
-    assert "--strict:" in strict.err
-    assert not said.err
-    assert main(["check", str(root / "cases" / "quick.toml"), "--strict"]) == 0
+    case = root / "cases" / "quick" / "specimen5.toml"
+    code, said, error = answer(capsys, "check", case)
+    assert (code, error) == (0, "")
+    code, strict, error = answer(capsys, "check", case, "--strict")
+    assert (code, strict, "--strict:" in error) == (2, said, True)
+    assert answer(capsys, "check", root / "cases" / "quick.toml", "--strict")[0] == 0

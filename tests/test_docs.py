@@ -167,14 +167,9 @@ def test_the_pages_that_the_code_writes_are_up_to_date():
     edges = import_graph.edges_of(ROOT)
     assert import_graph.read_csv(ROOT / "docs" / "import_graph.csv") == edges
     assert import_graph.digest_of(edges) in (ROOT / "docs" / "import_graph.svg").read_text()
-
-
-def test_the_import_graph_is_small_and_has_layers():
-    nodes, edges = import_graph.nodes_of(ROOT), import_graph.edges_of(ROOT)
+    nodes = import_graph.nodes_of(ROOT)
     assert (len(nodes) <= 22, len(edges) <= 90) == (True, True)
     assert max(import_graph.layers_of(nodes, edges).values()) < 10
-    with pytest.raises(ValueError, match="cycle"):
-        import_graph.layers_of({"a", "b"}, {("a", "b"), ("b", "a")})
 
 
 def test_every_key_command_and_name_is_explained():

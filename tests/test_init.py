@@ -97,6 +97,11 @@ def test_answers_that_make_no_case_are_refused(tmp_path, capsys):
     three = {"viscosity": "10", "mud_d50": "x", "solids": ""}
     missing = '2 answers are missing: --sand-d50 "0.40 mm", --solids'
     out = tmp_path / "case.toml"
+    out.write_text("mine")
+    assert init(out, sand_d50="") == 2
+    assert "is there already" in capsys.readouterr().err
+    assert out.read_text() == "mine"
+    out.unlink()
     for changed, message in (
         ({"sand_d50": "", "solids": ""}, missing),
         ({"overbalance": "300"}, "--overbalance: '300': has no unit"),
@@ -170,11 +175,3 @@ def test_cases_lists_and_copies_what_comes_with_fdnet(tmp_path, capsys, root, mo
     assert "leave --solids out" in capsys.readouterr().err
     text = "# A box of 4 x 2.4 mm, that is small." + chr(10) + "# More." + chr(10)
     assert first_sentence(text) == "A box of 4 x 2.4 mm, that is small"
-
-
-def test_an_existing_case_is_refused_before_anything_is_asked(tmp_path, capsys):
-    out = tmp_path / "case.toml"
-    out.write_text("mine")
-    assert init(out, sand_d50="") == 2
-    assert "is there already" in capsys.readouterr().err
-    assert out.read_text() == "mine"

@@ -147,10 +147,7 @@ def test_what_the_answer_rests_on_is_in_it(tmp_path, answer, numbers):
 def test_a_unit_cell_is_repeated_until_it_can_be_tessellated(
     tmp_path, numbers, places, radius, height, k, error
 ):
-    """k = 2 a2 / (9 c K), m2, for an edge of 1 mm and K of 42.1, 162.9 and 435.
-
-    Zick and Homsy 1982; the errors are what larger cells of the same lattices are off by.
-    """
+    """k = 2 a2 / (9 c K) (Zick and Homsy 1982), within what larger cells are off by."""
     file = table(tmp_path / "cell.csv", [(*place, radius) for place in places])
     given = ["--box", f"0,1,0,1,0,{height}", "--periodic", "xyz"]
     result = numbers(file, *given, "--axis", "all", "--sections", 2)

@@ -47,10 +47,7 @@ QUICK = ["SC_touching", "E_80_eps30", "N_100_radii13_eps40", "C_r5_d2", "H_r5_d1
 
 @pytest.mark.parametrize("names", [QUICK, pytest.param([], id="all", marks=pytest.mark.nightly)])
 def test_packs_lattices_and_losses_are_within_the_stated_error(run, names):
-    """k0 within 2 % and k/k0 within 10 % beside the truth's own error; 3 and 5 % in the mean.
-
-    Porosity 0.30 (overlapping) to 0.45, radii 1:1 to 1:3, k/k0 from 0.89 down to 0.0175.
-    """
+    """k0 within 2 % and k/k0 within 10 % beside the truth's own error; 3 and 5 % in the mean."""
     off = {False: [], True: []}
     for case in (one for one in cases(names) if one.known_before):
         result = run(case)

@@ -1,7 +1,4 @@
-"""Every warning that the package raises has an entry that says what follows and what to do.
-
-That the page of warnings is that of the entries, and its links lead somewhere, is in test_docs.py.
-"""
+"""Every warning that the package raises has an entry with what follows and what to do."""
 
 import ast
 import copy

@@ -49,10 +49,7 @@ def test_differences_of_students_sleep_data_are_those_of_textbooks(tmp_path):
 
 
 def test_the_seeds_needed_are_cohens(tmp_path):
-    """80 % power at 5 % for half a spread: 34 pairs, or 64 of each (Cohen 1988).
-
-    Two values m ± 1/sqrt(2) have the spread 1; without a difference no number of seeds shows one.
-    """
+    """For half a spread, at 80 % power and 5 %: 34 pairs, or 64 of each (Cohen 1988)."""
     half, needed = math.sqrt(0.5), []
     for name, one, other, shared in (
         ("paired", [0.5 - half, 0.5 + half], [0.0, 0.0], True),
@@ -79,10 +76,7 @@ def test_several_pairs_are_judged_together():
 
 
 def test_shared_packs_show_a_difference_that_separate_ones_hide(tmp_path):
-    """A constant gap of 0.01 with little noise, under a scatter of packs of 0.1.
-
-    A difference of shares ends at all of them.
-    """
+    """A gap of 0.01 under a scatter of packs of 0.1; a difference of shares ends at 1."""
     base, noise = [0.3, 0.4, 0.5, 0.6], [0.0101, 0.0099, 0.0102, 0.0098]
     values = {"a": base, "b": [x + y for x, y in zip(base, noise, strict=True)]}
     (paired,) = compared(tmp_path / "p", values).summary["pairs"]
@@ -102,10 +96,7 @@ def test_the_mean_of_a_sweep_takes_each_seed_once(tmp_path):
 
 
 def test_a_band_ends_where_its_quantity_does(tmp_path):
-    """t(1) = 12.7062 and t(2) = 4.302653; what is neither bounded nor within the bounds is whole.
-
-    The whole band of 0.5 and 0.6 is -0.085 to 1.185.
-    """
+    """t(1) = 12.7062 and t(2) = 4.302653: the whole band of 0.5 and 0.6 is -0.085 to 1.185."""
     t = 4.302653
     table = [
         ("k_reduction", [0.5, 0.6], (0.0, 1.0), [0, 1]),

@@ -172,10 +172,7 @@ def designed(write, losses: dict[str, list[float]], targets: str, capsys, **more
 
 
 def test_muds_are_ranked_by_their_bands(write, capsys):
-    """Four seeds with s = 0.01: half a band is 3.182 s / 2 = 0.016 about each mean.
-
-    t(n-1) 0.01 / sqrt(n) <= 0.01 first at n = 7: t(6) = 2.447 < 2.646.
-    """
+    """Half a band is 3.182 s / 2 = 0.016; t(n-1) / sqrt(n) <= 1 first at n = 7."""
     around = [-0.01, -0.01, 0.01, 0.01]
     losses = {
         name: [mean + x * 0.75**0.5 for x in around]
@@ -198,15 +195,12 @@ def test_bridging_is_the_share_that_passes(write, capsys):
     assert made["targets"] == pytest.approx({"depth": 5e-4, "k_loss": 0.3, "bridging": 0.01})
 
 
-def test_the_shipped_design_plans_three_muds_in_eight_packs(root):
+def test_the_shipped_design_plans_three_muds_and_every_shipped_sweep_runs(root):
     plan = sweep_plan(root / "cases/sweeps/bridging.toml")
     diameters = [round(2e6 * v.case.fines.mean_radius_m) for v in plan.variants]
     assert diameters == [30, 60, 100]
     assert (len(plan.jobs), len(set(plan.packs.values()))) == (24, 8)
-
-
-def test_every_variant_of_the_shipped_sweeps_runs(root):
-    """None is refused, and none has springs that its deposit would press flat."""
+    # no variant is refused, and none has springs that its deposit would press flat
     for name in ("bridging", "clogging", "coupling", "drag-and-overbalance"):
         for variant in sweep_plan(root / f"cases/sweeps/{name}.toml").variants:
             scales = scales_of(variant.case)

@@ -17,15 +17,11 @@ SWEEP = """
 name = "muds"
 case = "tiny.toml"
 seeds = 2
-[[variants]]
-name = "few"
-fines.count = 40
-[[variants]]
-name = "many"
-fines.count = 120
-[[variants]]
-name = "late"
-run.max_hours = 1e-9
+variants = [
+    {name = "few", fines.count = 40},
+    {name = "many", fines.count = 120},
+    {name = "late", run.max_hours = 1e-9},
+]
 """
 STAGES = ["--stages", "pack,invade,analyse", "--engine", "local", "--jobs", "2", "--quiet"]
 

@@ -38,10 +38,7 @@ def test_hawkins_skin_of_a_thin_zone_is_small():
 
 
 def test_rings_in_series_are_the_integral_of_the_pressure():
-    """p' = q / (k r): integrated numerically with and without the damage, over q / k.
-
-    The k is that of the formation, in series, also where the sand is more open at the face.
-    """
+    """p' = q / (k r), integrated numerically, over q / k; k of the formation is in series."""
     edges, ratios = np.array([0.0, 1e-3, 3e-3, 10e-3]), (0.05, 0.4, 0.9)
     for before, formation in [
         ((2e-12, 2e-12, 2e-12), 2e-12),
@@ -161,10 +158,7 @@ def test_each_rule_turns_at_its_published_limit():
         assert [rule["agrees"] for rule in rules] == [expected[word] for word in says]
         undecided = rules_of("undecided", **sizes(**changed))
         assert {rule["agrees"] for rule in undecided} == {None}
-
-
-def test_the_value_of_each_rule_is_its_ratio():
-    """0.309 is (5/9)^2: the share finer grows with the square root of the size up to D90."""
+    # 0.309 is (5/9)^2: the share finer grows with the square root of the size up to D90
     values = [rule["value"] for rule in rules_of("bridges", **sizes())]
     assert values == pytest.approx([0.4, 100 / 90, 40 / 90 * (9 / 5) ** 2, 270 / 60])
 
@@ -207,28 +201,16 @@ def test_the_loss_at_the_face_is_that_of_the_layers_in_series():
     assert face_loss(steps[:1], 1.5e-3) == (pytest.approx(0.75), 1e-3)
 
 
+DAMAGE = {"zone_depth_m": 2e-3, "zone_k_over_k0": 0.34, "reaches_the_end": False}
+DAMAGE |= {"lost_from": 0.05, "face_depth_m": 1e-3, "face_lost": 0.784}
 SUMMARY = {
-    "case": "a",
-    "seed": 3,
-    "stop_reason": "plugged",
-    "final": True,
-    "invaded_count": 900,
-    "invasion_depth_p95_m": 1.388e-3,
-    "k_initial_m2": 2e-12,
-    "porosity_initial": 0.38,
+    **{"case": "a", "seed": 3, "stop_reason": "plugged", "final": True, "invaded_count": 900},
+    **{"invasion_depth_p95_m": 1.388e-3, "k_initial_m2": 2e-12, "porosity_initial": 0.38},
     "words": {"end": "the face plugged: no fine crossed it for the set time"},
-    "damage": {
-        "zone_depth_m": 2e-3,
-        "zone_k_over_k0": 0.34,
-        "reaches_the_end": False,
-        "lost_from": 0.05,
-        "face_depth_m": 1e-3,
-        "face_lost": 0.784,
-    },
+    "damage": DAMAGE,
     "sections": [{"x_hi_m": 4e-3}],
     "scatter": {"depth_p95_relative": 0.36, "first_mm_loss": 0.067, "runs": 30, "source": "x.csv"},
 }
-
 WELL = {"skin": 0.056, "skin_flow_lost": 0.0081, "skin_well_radius_m": 0.108}
 FLOW = {"drag_last_update": {"k_over_k0": 0.278}, "damage_law_used": "thesis"}
 

@@ -15,7 +15,6 @@ from fdnet.report.picture import LAST_FRAMES, MovieFrame, Scene, write_movie
 from fdnet.run import movie
 from fdnet.run.movie import flux_of, movie_of
 
-BOX = np.array([[0.0, 4e-3], [0.0, 2e-3], [0.0, 2e-3]])
 GREYS = (40, 120, 200)
 
 
@@ -25,17 +24,17 @@ def drawn(scene, frames, targets, *, seconds):
         Image.new("RGB", (1500, 950), (grey,) * 3).save(target)
 
 
-def frames_of(folder):
-    return [MovieFrame(spheres=folder / f"{n}.vtp", words=f"{n} ms") for n in range(len(GREYS))]
-
-
-def scene_of(folder):
-    return Scene(grains=folder / "g.vtp", box=BOX)
+def written(path):
+    """A movie of three states of no run."""
+    scene = Scene(grains=path.parent / "g.vtp", box=np.array([[0.0, 4e-3], [0, 2e-3], [0, 2e-3]]))
+    files = [path.parent / f"{number}.vtp" for number in range(len(GREYS))]
+    frames = [MovieFrame(spheres=file, words=f"{file.stem} ms") for file in files]
+    return write_movie(path, frames, scene, per_second=4.0)
 
 
 def test_a_gif_shows_the_states_in_order_and_stays_on_the_last(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "draw_frames", drawn)
-    path = write_movie(tmp_path / "m.gif", frames_of(tmp_path), scene_of(tmp_path), per_second=4.0)
+    path = written(tmp_path / "m.gif")
     seen, total = [], 0
     with Image.open(path) as picture:
         for number in range(picture.n_frames):
@@ -53,11 +52,8 @@ def test_what_makes_no_movie_leaves_no_file(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "draw_frames", fail)
     for name, said in (("m.avi", "expected .gif, .mp4 or"), ("m.gif", "because no context")):
         with pytest.raises(CaseError, match=said):
-            write_movie(tmp_path / name, frames_of(tmp_path), scene_of(tmp_path), per_second=4.0)
+            written(tmp_path / name)
         assert not (tmp_path / name).exists()
-
-
-def test_an_odd_speed_and_a_folder_without_a_run_are_refused(tmp_path):
     with pytest.raises(CaseError, match=r"--fps: 99, expected 0.5 to 30"):
         movie_of(tmp_path, per_second=99)
     with pytest.raises(CaseError, match="holds no fdnet run"):

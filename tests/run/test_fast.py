@@ -15,14 +15,8 @@ from fdnet.run.movie import moments_of, movie_of
 from fdnet.run.pipeline import run_case
 from fdnet.scales.scales import invasion_scales
 
-FAST = (
-    "invasion.method=network",
-    "box.sides=periodic",
-    "drag={}",
-    "run={}",
-    "fines.supply=batches",
-    "cake.api_filtrate_mL=5.0",
-)
+FAST = ("invasion.method=network", "box.sides=periodic", "drag={}", "run={}")
+FAST += ("fines.supply=batches", "cake.api_filtrate_mL=5.0")
 
 
 @pytest.fixture(scope="module")

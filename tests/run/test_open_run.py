@@ -187,11 +187,8 @@ def test_a_finished_run_is_read_and_one_of_another_case_refused(run):
 def test_what_is_no_finished_run_is_refused(copied, tmp_path):
     (tmp_path / "a file").write_text("")
     (tmp_path / "empty").mkdir()
-    for name, message in (
-        ("none", "does not exist"),
-        ("a file", "is a file"),
-        ("empty", "holds no fdnet run"),
-    ):
+    said = {"none": "does not exist", "a file": "is a file", "empty": "holds no fdnet run"}
+    for name, message in said.items():
         with pytest.raises(CaseError, match=message):
             fdnet.open_run(tmp_path / name)
     (copied / "manifest.json").unlink()

@@ -122,21 +122,8 @@ def test_stages_one_after_the_other_equal_all_at_once_and_take_a_new_policy(whol
     assert (out / "spheres_damaged.csv").read_text() == (run / "spheres_damaged.csv").read_text()
 
 
-def test_force_with_another_law_keeps_pack_and_invasion(whole, copy):
+def test_force_with_another_law_keeps_pack_and_invasion_and_needs_no_unasked_stage(whole, copy):
     run, case, summary = whole
-    law = ("--set", "analysis.law=thesis", "--stages", "analyse", "--force", "--json")
-    again = fdnet("run", case, "--out", copy, *law)
-    assert again.returncode == 0, again.stderr
-    result = json.loads(again.stdout)
-    assert result["law"] == "thesis"
-    assert result["invaded_count"] == summary["invaded_count"]
-    assert result["k_initial_m2"] != summary["k_initial_m2"]
-    record = "invade/stage.json"
-    assert (copy / record).stat().st_mtime_ns == (run / record).stat().st_mtime_ns
-
-
-def test_force_that_would_need_an_unasked_stage_changes_nothing(whole, copy):
-    run, case, _ = whole
     for words, code, said in (
         (["--set", "fines.friction=0.3", "--stages", "analyse,report"], 2, "add invade to --st"),
         (["--liggghts", "/nowhere"], 3, "LIGGGHTS not found"),
@@ -146,6 +133,15 @@ def test_force_that_would_need_an_unasked_stage_changes_nothing(whole, copy):
         assert said in refused.stderr
     assert sorted(p.name for p in copy.iterdir()) == sorted(p.name for p in run.iterdir())
     assert fdnet("run", case, "--out", copy).returncode == 0
+    law = ("--set", "analysis.law=thesis", "--stages", "analyse", "--force", "--json")
+    again = fdnet("run", case, "--out", copy, *law)
+    assert again.returncode == 0, again.stderr
+    result = json.loads(again.stdout)
+    assert result["law"] == "thesis"
+    assert result["invaded_count"] == summary["invaded_count"]
+    assert result["k_initial_m2"] != summary["k_initial_m2"]
+    record = "invade/stage.json"
+    assert (copy / record).stat().st_mtime_ns == (run / record).stat().st_mtime_ns
 
 
 def test_damaged_records_are_named_and_force_mends_them(whole, tmp_path):
@@ -212,15 +208,12 @@ def test_a_stage_without_its_forerunner_and_one_of_no_name_are_refused(tmp_path)
 
 
 def kill_when(command: list[str], ready, sign: int) -> int:
-    """Start a run, send `sign` as soon as `ready()` is true; returns the exit code.
-
-    A shell that runs the tests in the background makes its children ignore SIGINT, so its default
-    is set again.
-    """
+    """Start a run, send `sign` as soon as `ready()` is true; returns the exit code."""
     process = subprocess.Popen(
         [sys.executable, "-m", "fdnet.cli", *command],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
+        # a shell that runs the tests in the background makes its children ignore SIGINT
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 60

@@ -8,25 +8,6 @@ from fdnet.network.fines.occupancy import measure_occupancy
 from validation.closures import added_resistance, arrival_table
 
 
-def added(scale: float, *, fines: int = 1) -> np.ndarray:
-    """Of `fines` equal fines that stand at one place in a cubic lattice of pitch `scale` mm."""
-    lattice = 1e-3 * scale * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)
-    grains = fdnet.Snapshot.from_arrays(lattice, 0.5e-3 * scale)
-    network = fdnet.build_network(grains, periodic="yz")
-    place = [[1e-3 * scale] * 3] * fines
-    held = fdnet.Snapshot.from_arrays(place, 5e-5 * scale, box=grains.box, kind="fine")
-    return added_resistance(network, measure_occupancy(network, held))
-
-
-def test_added_resistance_is_one_over_a_volume_and_goes_with_the_square_of_the_filled_share():
-    one = added(1.0)
-    assert np.any(one > 0)
-    assert np.any(one == 0)
-    assert added(2.0) == pytest.approx(one / 8.0, rel=1e-9)
-    # the same diameter, twice the volume
-    assert added(1.0, fines=2) == pytest.approx(4.0 * one, rel=1e-9)
-
-
 def test_added_resistance_of_a_fine_in_one_tetrahedron_by_hand():
     """Four touching spheres: the void of their tetrahedron is 0.220364 of it."""
     corner = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]]) / np.sqrt(2.0) * 1e-3

@@ -49,8 +49,8 @@ def test_a_quick_form_agrees_and_gives_the_committed_numbers(chapter, name, root
     assert all(one.verdict == "holds" for one in findings(chapter.CHAPTER.comparisons, rows))
     keys = ["comparison", "value", "seed", "quantity"]
     known = read_rows(root / "docs" / "validation" / f"{own}.csv")
-    texts = [one.assign(value=one.value.astype(str)) for one in (rows, known)]
-    both = texts[0].merge(texts[1], on=keys, suffixes=("", "_known"))
+    rows, known = (one.assign(value=one.value.astype(str)) for one in (rows, known))
+    both = rows.merge(known, on=keys, suffixes=("", "_known"))
     if "loose pack" not in name and "constriction" not in name:
         assert len(both) == len(rows)
         apart = (both.observed - both.observed_known).abs()

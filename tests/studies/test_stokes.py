@@ -40,11 +40,6 @@ def cell(position, radius, edges=(1.0, 1.0, 1.0)):
     return resting(np.asarray(position, float), radius, np.array([[0.0, edge] for edge in edges]))
 
 
-def zick_and_homsy(solid, drag, radius):
-    """k from the drag factor, F = 6 pi mu R K U (1982, J. Fluid Mech. 115, 13, table 2)."""
-    return 2.0 * radius**2 / (9.0 * solid * drag)
-
-
 LATTICES = [
     (SC, 0.343, 15.4, (24, 48), 0.004),
     (BCC, np.pi * np.sqrt(3) / 8, 162.9, (32, 48), 0.01),
@@ -60,10 +55,12 @@ LATTICES = [
     "lattices", [LATTICES[:2], pytest.param(LATTICES[2:], marks=pytest.mark.nightly)]
 )
 def test_zick_and_homsy(lattices):
+    """The drag factor K of F = 6 pi mu R K U (1982, J. Fluid Mech. 115, 13, table 2)."""
     for places, solid, drag, cells, bound in lattices:
         pack = cell(places, (solid / len(places) * 3 / 4 / np.pi) ** (1 / 3))
         k = extrapolate(*(solve_stokes(pack, cells=n) for n in cells)).k
-        assert k == pytest.approx(zick_and_homsy(solid, drag, pack.radius[0]), rel=bound)
+        exact = 2.0 * pack.radius[0] ** 2 / (9.0 * solid * drag)
+        assert k == pytest.approx(exact, rel=bound), solid
 
 
 def test_a_direct_solve_gives_the_same_tensor():
@@ -102,10 +99,7 @@ def test_a_direct_solve_of_the_whole_mirrored_cell_gives_the_same():
 
 @pytest.mark.parametrize(("closed", "expected"), [((False, True, True), 0.035144), (None, 1 / 12)])
 def test_walls_hold_the_fluid_as_in_a_duct(closed, expected):
-    """In a square duct 0.035144 a^2 (Shah and London 1978), between plates h^2 / 12.
-
-    The sphere buried in a wall closes nothing.
-    """
+    """0.035144 a^2 (Shah and London 1978), h^2 / 12; a sphere buried in a wall closes nothing."""
     buried = cell([[0.2, 0.5, -0.2]], 0.1, (0.5, 1.0, 1.0))
     closed = closed or (False, False, True)
     flows = (solve_slab(buried, (0.0, 0.5), cells=n, closed=closed) for n in (20, 32))
