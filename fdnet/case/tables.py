@@ -387,10 +387,8 @@ class MudCake(Part):
 # A case file gives a count; only Python gives edges, as a tuple.
 Count = Annotated[int, Field(ge=1, le=names.MOST_SECTIONS), Tag("[count]")]
 Edges = Annotated[tuple[Finite, ...], Tag("[edges]")]
-Sections = Annotated[
-    Count | Edges,
-    Discriminator(lambda value: "[edges]" if isinstance(value, tuple) else "[count]"),
-]
+_KIND = Discriminator(lambda value: "[edges]" if isinstance(value, tuple) else "[count]")
+Sections = Annotated[Count | Edges, _KIND]
 
 
 class AnalysisKeys(TypedDict, total=False):

@@ -209,7 +209,7 @@ def designed(
     """
     sand, mud = _sizes(answers, folder)
     first = _first_choice(answers, budget, sand, mud)
-    ends = (mud.cut_percent[0], min(first.mud_cut, mud.cut_percent[1]))  # without sand's sizes
+    ends = (mud.cut_percent[0], min(first.mud_cut, mud.cut_percent[1]))  # none as coarse as sand
     curve = mud.model_copy(update={"cut_percent": ends}).curve()
     choices = list(_candidates(first, curve))
     low, high, why = 0, len(choices) - 1, ""
