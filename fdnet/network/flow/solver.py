@@ -308,14 +308,11 @@ MOST_SWEEPS = 30
 class Balance(NamedTuple):
     """Pressures of n nodes and fluxes of K links."""
 
-    pressure: Array
-    """(n,) over the unit of the jumps."""
-    flux: Array
-    """(K,) from the first to the second end, in units of conductance times jump."""
+    pressure: Array  # (n,) over the unit of the jumps
+    flux: Array  # (K,) from the first to the second end, in units of conductance times jump
     defect: float
     """Sum of the imbalances of the nodes over the throughput; it bounds its relative error."""
-    method: str
-    """How the system was solved."""
+    method: str  # how the system was solved
 
 
 def balance_links(ends: Array, conductance: Array, jump: Array, count: int) -> Balance:
