@@ -3,9 +3,8 @@
 The keys carry the unit of the user; properties give the same values in SI for everything else.
 """
 
-import inspect
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypedDict, TypeVar
 
 import numpy as np
@@ -385,15 +384,11 @@ class MudCake(Part):
     api_filtrate_m3: ClassVar = InSI[float | None]("api_filtrate_mL", 1e-6)
 
 
-def _count_or_edges(value: Any) -> str:
-    """A case file gives a count; only Python gives edges, as a tuple."""
-    return "[edges]" if isinstance(value, tuple) else "[count]"
-
-
-Function = TypeVar("Function", bound=Callable[..., Any])
+# A case file gives a count; only Python gives edges, as a tuple.
 Count = Annotated[int, Field(ge=1, le=names.MOST_SECTIONS), Tag("[count]")]
 Edges = Annotated[tuple[Finite, ...], Tag("[edges]")]
-Sections = Annotated[Count | Edges, Discriminator(_count_or_edges)]
+_KIND = Discriminator(lambda value: "[edges]" if isinstance(value, tuple) else "[count]")
+Sections = Annotated[Count | Edges, _KIND]
 
 
 class AnalysisKeys(TypedDict, total=False):
@@ -470,24 +465,6 @@ class AnalysisChoices(Part):
     def changed(self, **keys: Any) -> "AnalysisChoices":
         """The same choices with `keys` changed. Raises CaseError as `of_pack` does."""
         return type(self).of_pack(**self.model_dump() | keys) if keys else self
-
-
-def with_visible_choices(function: Function) -> Function:
-    """The function, whose `**choices: Unpack[AnalysisKeys]` is shown as the single keywords.
-
-    Their defaults are shown as they are without `options`.
-    """
-    shown = inspect.signature(function)
-    usual, kinds = AnalysisChoices.of_pack(), AnalysisKeys.__annotations__
-    plain = [one for one in shown.parameters.values() if one.kind is not one.VAR_KEYWORD]
-    single = [
-        inspect.Parameter(
-            name, inspect.Parameter.KEYWORD_ONLY, default=getattr(usual, name), annotation=kind
-        )
-        for name, kind in kinds.items()
-    ]
-    function.__dict__["__signature__"] = shown.replace(parameters=[*plain, *single])
-    return function
 
 
 def _plain_sections(value: Any) -> Any:

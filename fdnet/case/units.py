@@ -4,7 +4,6 @@ Conversions are decimal, so that "40 um" is exactly the number 0.04 in mm.
 """
 
 import re
-from collections.abc import Iterator
 from decimal import Decimal
 
 _POUND, _INCH = Decimal("0.45359237"), Decimal("0.0254")
@@ -147,7 +146,7 @@ def _read(text: str, dimension: str) -> tuple[Decimal, Decimal]:
         return Decimal(match[1]), UNITS[dimension][unit]
     if unit in _AMBIGUOUS:
         raise ValueError(f"{unit!r} may mean {_AMBIGUOUS[unit]}; expected {example}")
-    others = list(_dimensions_of(unit))
+    others = [dimension for dimension, units in UNITS.items() if unit in units]
     what = f"{unit!r} is a unit of {others[0]}" if others else f"{unit!r} is no unit that is known"
     raise ValueError(f"{what}, expected {example}")
 
@@ -156,7 +155,3 @@ def _spelled(unit: str) -> str:
     for written, plain in _SPELLINGS.items():
         unit = unit.replace(written, plain)
     return " ".join(unit.split())
-
-
-def _dimensions_of(unit: str) -> Iterator[str]:
-    return (dimension for dimension, units in UNITS.items() if unit in units)

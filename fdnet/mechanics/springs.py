@@ -6,7 +6,6 @@ from itertools import product
 
 import numpy as np
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, cg
 
 from fdnet.errors import MechanicsError
 from fdnet.network.flow.solver import dissected, factored
@@ -265,11 +264,7 @@ def bond_stress(force: Array, radius: Array) -> tuple[Array, Array]:
     return np.where(there, tension, 0.0), np.where(there, shear, 0.0)
 
 
-# ---- Stiffness matrices of packs: assembled, and solved directly or by conjugate gradients.
-LARGEST_DIRECT = 4000
-"""Grains up to which the system is factored; larger ones are solved by conjugate gradients."""
-WITHIN, MOST_STEPS = 1e-10, 20_000
-"""Residual over load that is reached, and the most steps of conjugate gradients."""
+# ---- Stiffness matrices of packs: assembled, and factored.
 _FLOOR = 1e-11
 """Stiffness, over the largest, that keeps motions which no spring resists from growing."""
 
@@ -288,13 +283,10 @@ def stiffness_matrix(of_grains: sparse.csr_matrix, springs: Array) -> sparse.csr
 
 
 def solver_of(matrix: sparse.csr_matrix) -> SolveLoad:
-    """Solves systems with the stiffness matrix (6 N, 6 N) for one load (6 N,) at a time."""
-    large = matrix.shape[0] > 6 * LARGEST_DIRECT
-    return iterative_solver(matrix) if large else direct_solver(matrix)
+    """Solves with a stiffness matrix (6 N, 6 N) for one load (6 N,) at a time.
 
-
-def direct_solver(matrix: sparse.csr_matrix) -> SolveLoad:
-    """By one factorisation (`flow.solver.factored`), the six motions of a grain together.
+    It is factored once (`flow.solver.factored`), the six motions of a grain together: 10,000
+    grains take 4 s and 0.6 GB.
 
     Raises MechanicsError where the matrix cannot be factored.
     """
@@ -308,31 +300,3 @@ def direct_solver(matrix: sparse.csr_matrix) -> SolveLoad:
             f"stiffness of {count} grains cannot be factored ({error}); raise the stiffness of "
             "the contacts or add bonds"
         ) from error
-
-
-def iterative_solver(matrix: sparse.csr_matrix) -> SolveLoad:
-    """By conjugate gradients, preconditioned with the inverse 6 x 6 block of each grain.
-
-    The solution raises MechanicsError where it does not reach the residual `WITHIN`.
-    """
-    blocks = matrix.tobsr((6, 6))
-    row = np.repeat(np.arange(len(blocks.indptr) - 1), np.diff(blocks.indptr))
-    own = row == blocks.indices
-    diagonal = np.zeros((matrix.shape[0] // 6, 6, 6))
-    diagonal[row[own]] = blocks.data[own]
-    inverse = np.linalg.inv(diagonal)
-
-    def better(missing: Array) -> Array:
-        return np.einsum("nij,nj->ni", inverse, missing.reshape(-1, 6)).ravel()
-
-    def solve(load: Array) -> Array:
-        inner = LinearOperator(matrix.shape, better, dtype=float)
-        moved, left = cg(matrix, load, rtol=WITHIN, maxiter=MOST_STEPS, M=inner)
-        if left:
-            raise MechanicsError(
-                f"solve of {len(load) // 6} grains: the residual is not {WITHIN:g} of the load "
-                f"after {MOST_STEPS} steps; take a smaller or a stiffer pack"
-            )
-        return moved
-
-    return solve

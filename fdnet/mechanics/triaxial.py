@@ -250,7 +250,7 @@ def _newton(
     joints, count = np.arange(len(forces.tangent)), of_grains.shape[1]
     stiff = sparse.bsr_matrix((forces.tangent, joints, np.arange(len(joints) + 1))).tocsr()
     matrix = (of_grains.T @ stiff @ of_grains).tocsr()
-    solve = springs.direct_solver(matrix + load.drag * sparse.identity(count, format="csr"))
+    solve = springs.solver_of(matrix + load.drag * sparse.identity(count, format="csr"))
     moved_by = solve(missing[:count])
     if not len(free):
         return moved_by, np.empty(0)

@@ -26,8 +26,7 @@ ON_FACET = 1e-9
 class Nodes(NamedTuple):
     """The nodes of the pores (P) of a network, above the facets of its throats (T)."""
 
-    position: Array
-    """(P, 3) m."""
+    position: Array  # (P, 3) m
     heights: Array
     """(T, 2) m, distances of the nodes of both pores from the facet of a throat, positive on the
     pore's own side. Only pores of a polyhedron with several tetrahedra can have a negative one."""

@@ -31,16 +31,11 @@ theirs, 3 contacts give 5 and 19 % less, for small fines lie caged between other
 class Invaded:
     """Fines centred in the box, and the cake. The formation face is the low x face, x = 0."""
 
-    invaded_count: int
-    """Number of fines centred in the specimen."""
-    invaded_volume: float
-    """Their volume, m3, of whole spheres."""
-    invasion_depth: float
-    """Depth of the deepest of them, m; 0 without fines."""
-    invasion_depth_p95: float
-    """Depth above which 95 % of them lie, m; 0 without fines."""
-    cake_thickness: float
-    """Thickness of the cake upstream of the formation face, m."""
+    invaded_count: int  # number of fines centred in the specimen
+    invaded_volume: float  # their volume, m3, of whole spheres
+    invasion_depth: float  # depth of the deepest of them, m; 0 without fines
+    invasion_depth_p95: float  # depth above which 95 % of them lie, m; 0 without fines
+    cake_thickness: float  # thickness of the cake upstream of the formation face, m
 
 
 def measure_invaded(spheres: Snapshot, *, periodic: Sequence[bool]) -> Invaded:
@@ -251,34 +246,20 @@ class Specimen:
 
     grains: tuple[Snapshot, Snapshot]
     """The grains as they were, and where they ended; those of all copies."""
-    fines: Snapshot | None
-    """All fines, those beyond the box among them; None without fines."""
-    copies: tuple[int, int, int]
-    """Of the cell along x, y and z."""
-    inner_grains: int
-    """Number of grains wholly inside other spheres; they were left out."""
-    inner_fines: int
-    """Number of fines likewise."""
-    first: Network
-    """Network of the grains as they were."""
-    network: Network
-    """Network of the grains where they ended, the same one unless they moved."""
-    moved: bool
-    """Whether any grain moved by more than 1 nm."""
-    occupancy: Occupancy | None
-    """What the fines fill of `network`; None without fines."""
-    edges: Array
-    """(S+1,) edges of the sections, m."""
-    bins: Array
-    """(B+1,) edges of the profile's bins, m."""
-    porosity: tuple[geometry.Porosity, geometry.Porosity]
-    """Porosity before and after, by depth."""
-    depth: Array
-    """(F,) depth of the fines centred in the box, m."""
-    invaded: Invaded
-    """Number, volume and depths of these fines, and the cake."""
-    outside_sides: int
-    """Number of fines centred beyond a side wall."""
+    fines: Snapshot | None  # all fines, those beyond the box among them; None without fines
+    copies: tuple[int, int, int]  # of the cell along x, y and z
+    inner_grains: int  # number of grains wholly inside other spheres; they were left out
+    inner_fines: int  # number of fines likewise
+    first: Network  # network of the grains as they were
+    network: Network  # network of the grains where they ended, the same one unless they moved
+    moved: bool  # whether any grain moved by more than 1 nm
+    occupancy: Occupancy | None  # what the fines fill of `network`; None without fines
+    edges: Array  # (S+1,) edges of the sections, m
+    bins: Array  # (B+1,) edges of the profile's bins, m
+    porosity: tuple[geometry.Porosity, geometry.Porosity]  # porosity before and after, by depth
+    depth: Array  # (F,) depth of the fines centred in the box, m
+    invaded: Invaded  # number, volume and depths of these fines, and the cake
+    outside_sides: int  # number of fines centred beyond a side wall
 
     __repr__ = one_line
 

@@ -117,14 +117,10 @@ NO_SLABS = sections.SlabK(cut_out=frozen([]), inplace=frozen([]), flows=())
 class State:
     """A network with the conductance of its throats, its flow and its permeability."""
 
-    network: Network
-    """Pores and throats."""
-    conductance: Array
-    """(T,) m3."""
-    flow: Flow
-    """Through the box."""
-    k: float
-    """m2, of the whole specimen."""
+    network: Network  # pores and throats
+    conductance: Array  # (T,) m3
+    flow: Flow  # through the box
+    k: float  # m2, of the whole specimen
     halves: Array | None
     """(T, 2) 1/m3, resistances of the two halves of the throats, by which the pressure falls along
     them; None for laws that have none."""

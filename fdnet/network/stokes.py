@@ -35,19 +35,14 @@ class Lattice:
     component across them lies on the lower wall and carries no flow; there is none on the upper.
     """
 
-    low: Array
-    """(3,) m, lower corner."""
-    spacing: Array
-    """(3,) m, edges of a cell."""
-    shape: Shape
-    """Cells along x, y and z."""
-    walled: Walled
-    """Whether the sides across x (never), y and z are walls; else they are periodic."""
+    low: Array  # (3,) m, lower corner
+    spacing: Array  # (3,) m, edges of a cell
+    shape: Shape  # cells along x, y and z
+    walled: Walled  # whether the sides across x (never), y and z are walls; else they are periodic
     specimen: tuple[float, float]
     """Lower and upper end of the specimen along x, m; the side walls hold the fluid between them,
     and let it slip beyond."""
-    repeats: bool
-    """Whether the specimen itself fills the grid along x."""
+    repeats: bool  # whether the specimen itself fills the grid along x
     planes: bool = False
     """Whether the sides across x are planes of one pressure each, with no velocity along them;
     component 0 has nodes on both of them."""
@@ -222,27 +217,19 @@ LEAST_DRAG = 1e-6
 class Walls:
     """M nodes of one velocity component that carry a force."""
 
-    node: Array
-    """(M,) flat index in an array of nodes."""
-    slack: Array
-    """(M,) velocity per force: 0 where u = 0 is imposed, else 1 / drag."""
-    owner: Array
-    """(M,) sphere that the force is on, or SIDE_WALL."""
-    solid: Array
-    """Array of nodes, true in the solid."""
+    node: Array  # (M,) flat index in an array of nodes
+    slack: Array  # (M,) velocity per force: 0 where u = 0 is imposed, else 1 / drag
+    owner: Array  # (M,) sphere that the force is on, or SIDE_WALL
+    solid: Array  # array of nodes, true in the solid
 
 
 class Marks(NamedTuple):
     """What is known of each node of a velocity component."""
 
-    solid: Array
-    """0 fluid, 1 shell, 2 deeper."""
-    reach: Array
-    """(6, ...) free way ahead and back along x, y, z in cells, at most 1."""
-    nearest: Array
-    """The sphere that shortens the reach most or that a shell node is of."""
-    closest: Array
-    """That least reach, or minus the depth of a shell node."""
+    solid: Array  # 0 fluid, 1 shell, 2 deeper
+    reach: Array  # (6, ...) free way ahead and back along x, y, z in cells, at most 1
+    nearest: Array  # the sphere that shortens the reach most or that a shell node is of
+    closest: Array  # that least reach, or minus the depth of a shell node
 
 
 def find_walls(lattice: Lattice, component: int, position: Array, radius: Array) -> Walls:
@@ -482,20 +469,13 @@ class Problem:
 class GridFlow:
     """A solved flow around N spheres with the superficial velocity U along x; viscosity mu."""
 
-    lattice: Lattice
-    """The grid."""
-    force: Array
-    """(3, n0, n1, n2) force on the fluid at each node over mu U; spacing along x 1."""
-    drift: Array
-    """(3,) mean velocity over U."""
-    slip: float
-    """Rms velocity left at the walls over U."""
-    iterations: int
-    """Of the conjugate gradients."""
-    k: float
-    """Permeability m2."""
-    walls: tuple[Walls, Walls, Walls]
-    """Of the three velocity components."""
+    lattice: Lattice  # the grid
+    force: Array  # (3, n0, n1, n2) force on the fluid at each node over mu U; spacing along x 1
+    drift: Array  # (3,) mean velocity over U
+    slip: float  # rms velocity left at the walls over U
+    iterations: int  # of the conjugate gradients
+    k: float  # permeability m2
+    walls: tuple[Walls, Walls, Walls]  # of the three velocity components
 
     __repr__ = one_line
 
@@ -567,18 +547,12 @@ def solve(
 class StokesFlow:
     """A solved cell or slab."""
 
-    k: float
-    """Permeability along x, m2."""
-    iterations: int
-    """Of the conjugate gradients."""
-    residual: float
-    """Rms velocity that is left at the walls over the superficial velocity."""
-    seconds: float
-    """That the solve took."""
-    cells: int
-    """On the longest edge."""
-    unknowns: int
-    """Number of forces."""
+    k: float  # permeability along x, m2
+    iterations: int  # of the conjugate gradients
+    residual: float  # rms velocity that is left at the walls over the superficial velocity
+    seconds: float  # that the solve took
+    cells: int  # on the longest edge
+    unknowns: int  # number of forces
 
 
 class Estimate(NamedTuple):

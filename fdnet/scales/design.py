@@ -209,7 +209,9 @@ def designed(
     """
     sand, mud = _sizes(answers, folder)
     first = _first_choice(answers, budget, sand, mud)
-    choices = list(_candidates(first, _mud_curve(mud, first.mud_cut)))
+    ends = (mud.cut_percent[0], min(first.mud_cut, mud.cut_percent[1]))  # none as coarse as sand
+    curve = mud.model_copy(update={"cut_percent": ends}).curve()
+    choices = list(_candidates(first, curve))
     low, high, why = 0, len(choices) - 1, ""
     while low < high:
         middle = (low + high) // 2
@@ -255,12 +257,6 @@ def _sizes(answers: Answers, folder: Path) -> tuple[Sizes, Sizes]:
 def _spoken(problem: str) -> str:
     """A problem of a case by the options of `fdnet init`, without their number in front."""
     return by_options(re.sub(r"^fdnet init: \d+ problems?: ", "", problem))
-
-
-def _mud_curve(mud: Sizes, coarsest: float) -> SizeCurve:
-    """The solids without those that are as coarse as the sand; `coarsest` is in percent."""
-    ends = (mud.cut_percent[0], min(coarsest, mud.cut_percent[1]))
-    return mud.model_copy(update={"cut_percent": ends}).curve()
 
 
 def _first_choice(answers: Answers, budget: Budget, sand: Sizes, mud: Sizes) -> Choice:

@@ -40,8 +40,7 @@ class CellFrame(NamedTuple):
 class Nearby(NamedTuple):
     """Walls near each cell of a grid."""
 
-    first: Array
-    """(cells + 1,) row where the spheres of each cell begin."""
+    first: Array  # (cells + 1,) row where the spheres of each cell begin
     place: Array
     """(K, 4) centre and radius of a sphere, shifted by periods to stand next to the cell."""
     sides: Array

@@ -25,8 +25,7 @@ _NODE, _WEIGHT = np.polynomial.legendre.leggauss(4)
 class Neighbourhood(NamedTuple):
     """What surrounds each fine (N,)."""
 
-    porosity: Array
-    """(N,) of the fines around it, in the space outside of grains and walls."""
+    porosity: Array  # (N,) of the fines around it, in the space outside of grains and walls
     size_ratio: Array
     """(N,) its diameter over the Sauter mean diameter of these fines, itself among them."""
     capped: int

@@ -37,14 +37,10 @@ def points_in_boxes(point: Array, low: Array, high: Array) -> tuple[Array, Array
 class Grid(NamedTuple):
     """Cubic cells that hold points."""
 
-    start: Array
-    """(3,) m, the low corner."""
-    edge: float
-    """m, of a cell."""
-    shape: Array
-    """(3,) number of cells along each axis."""
-    first: Array
-    """Of each cell the index of its first point, and the number of points at the end."""
+    start: Array  # (3,) m, the low corner
+    edge: float  # m, of a cell
+    shape: Array  # (3,) number of cells along each axis
+    first: Array  # of each cell the index of its first point, and the number of points at the end
 
 
 def grid_of(point: Array, edge: float | None = None) -> tuple[Grid, Array]:
@@ -363,10 +359,8 @@ class Holders(NamedTuple):
     """The pores (P) of a `network`, which hold fines, as tetrahedra inside the box."""
 
     network: Network
-    piece: Array
-    """(K, 4, 3) m, the tetrahedra."""
-    pore: Array
-    """(K,) that each is a part of."""
+    piece: Array  # (K, 4, 3) m, the tetrahedra
+    pore: Array  # (K,) that each is a part of
 
 
 def holders_of(network: Network) -> Holders:
@@ -416,16 +410,11 @@ def deposit_in_pores(network: Network, fines: Snapshot) -> tuple[Array, Array]:
 class Deposit:
     """Fines (N) and their K pieces in the pores (P), sorted by id of the fine, then by pore."""
 
-    network: Network
-    """Whose pores they are."""
-    fines: Snapshot
-    """As they were measured."""
-    pore: Array
-    """(K,) that holds the piece."""
-    fine: Array
-    """(K,) index of the fine."""
-    volume: Array
-    """(K,) m3 of the fine in the pore, over the share of the pore inside the box."""
+    network: Network  # whose pores they are
+    fines: Snapshot  # as they were measured
+    pore: Array  # (K,) that holds the piece
+    fine: Array  # (K,) index of the fine
+    volume: Array  # (K,) m3 of the fine in the pore, over the share of the pore inside the box
 
     __repr__ = one_line
 

@@ -24,16 +24,11 @@ GAUSS_POINTS = 10
 class Pairs(NamedTuple):
     """K pairs of a sphere and a cylinder, which spans depth 0 to its length."""
 
-    sphere: Array
-    """(K,) m, radius of the sphere."""
-    offset: Array
-    """(K,) m, distance of the centre of the sphere from the axis."""
-    depth: Array
-    """(K,) m, place of the centre along the axis."""
-    tube: Array
-    """(K,) m, radius of the cylinder."""
-    length: Array
-    """(K,) m, of the cylinder."""
+    sphere: Array  # (K,) m, radius of the sphere
+    offset: Array  # (K,) m, distance of the centre of the sphere from the axis
+    depth: Array  # (K,) m, place of the centre along the axis
+    tube: Array  # (K,) m, radius of the cylinder
+    length: Array  # (K,) m, of the cylinder
 
     def where(self, mask: Array) -> "Pairs":
         """The pairs for which `mask` (K,) is true."""

@@ -31,10 +31,8 @@ class Links(NamedTuple):
 
     ends: Array
     """(K, 2) number of the group of the pore (`Network.pore_group`), or INLET, or OUTLET."""
-    conductance: Array
-    """(K,) m3 (flux times viscosity over pressure drop)."""
-    throat: Array
-    """(K,) index of the throat that the link is, or is a part of."""
+    conductance: Array  # (K,) m3 (flux times viscosity over pressure drop)
+    throat: Array  # (K,) index of the throat that the link is, or is a part of
 
 
 def open_links(network: Network, conductance: Array) -> Links:

@@ -18,12 +18,9 @@ from fdnet.spheres.snapshot import Array, frozen, one_line
 class SlabK:
     """Permeability of S slabs of one state of a specimen."""
 
-    cut_out: Array
-    """(S,) m2, of each slab alone, with the pressure held on its two planes."""
-    inplace: Array
-    """(S,) m2, from the pressures of the whole specimen."""
-    flows: tuple[Flow, ...]
-    """S flows through the slabs cut out."""
+    cut_out: Array  # (S,) m2, of each slab alone, with the pressure held on its two planes
+    inplace: Array  # (S,) m2, from the pressures of the whole specimen
+    flows: tuple[Flow, ...]  # S flows through the slabs cut out
 
     __repr__ = one_line
 
@@ -128,18 +125,12 @@ MOST_LAYERS = 200
 class Layers:
     """B thin layers from the formation face, under the pressures of the whole specimen."""
 
-    edges: Array
-    """(B+1,) m."""
-    k_initial: Array
-    """(B,) m2, without fines."""
-    k_damaged: Array
-    """(B,) m2, with fines; 0 without flow."""
-    drop_initial: Array
-    """(B,) share of the specimen's pressure drop in the layer, without fines."""
-    drop_damaged: Array
-    """(B,) the same with fines; NaN without flow."""
-    fines_count: Array
-    """(B,) number of fines centred in the layer."""
+    edges: Array  # (B+1,) m
+    k_initial: Array  # (B,) m2, without fines
+    k_damaged: Array  # (B,) m2, with fines; 0 without flow
+    drop_initial: Array  # (B,) share of the specimen's pressure drop in the layer, without fines
+    drop_damaged: Array  # (B,) the same with fines; NaN without flow
+    fines_count: Array  # (B,) number of fines centred in the layer
 
     __repr__ = one_line
 
@@ -172,30 +163,18 @@ class Section:
     values make up the permeability of the whole.
     """
 
-    section: int
-    """Number of the slab, from 1 at the low x face."""
-    x_lo: float
-    """m, lower bound."""
-    x_hi: float
-    """m, upper bound."""
-    porosity_initial: float
-    """Without fines, overlap of spheres counted once."""
-    porosity_damaged: float
-    """With fines, overlap of spheres counted once."""
-    k_initial: float
-    """m2, cut out, without fines."""
-    k_damaged: float
-    """m2, cut out, with fines."""
-    k_reduction: float | None
-    """1 - k_damaged / k_initial; None where k_initial is 0."""
-    k_initial_inplace: float
-    """m2, in place, without fines."""
-    k_damaged_inplace: float
-    """m2, in place, with fines."""
-    fines_count: int
-    """Number of fines centred in the slab."""
-    fines_fraction: float
-    """These as a share of all invaded fines."""
+    section: int  # number of the slab, from 1 at the low x face
+    x_lo: float  # m, lower bound
+    x_hi: float  # m, upper bound
+    porosity_initial: float  # without fines, overlap of spheres counted once
+    porosity_damaged: float  # with fines, overlap of spheres counted once
+    k_initial: float  # m2, cut out, without fines
+    k_damaged: float  # m2, cut out, with fines
+    k_reduction: float | None  # 1 - k_damaged / k_initial; None where k_initial is 0
+    k_initial_inplace: float  # m2, in place, without fines
+    k_damaged_inplace: float  # m2, in place, with fines
+    fines_count: int  # number of fines centred in the slab
+    fines_fraction: float  # these as a share of all invaded fines
 
     def row(self) -> dict[str, Any]:
         """The values by the names of sections.csv, which end in their unit (m, m2)."""
@@ -213,14 +192,10 @@ SECTION_UNITS = dict.fromkeys(("x_lo", "x_hi"), "_m") | dict.fromkeys(
 class Profile:
     """Porosity and fines in B finer bins of depth."""
 
-    edges: Array
-    """(B+1,) m."""
-    porosity_initial: Array
-    """(B,) without fines."""
-    porosity_damaged: Array
-    """(B,) with fines."""
-    fines_fraction: Array
-    """(B,) share of all invaded fines."""
+    edges: Array  # (B+1,) m
+    porosity_initial: Array  # (B,) without fines
+    porosity_damaged: Array  # (B,) with fines
+    fines_fraction: Array  # (B,) share of all invaded fines
 
     __repr__ = one_line
 

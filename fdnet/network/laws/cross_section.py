@@ -44,15 +44,12 @@ class Shapes(NamedTuple):
     """The sections of K throats, whatever their height; x along the first edge of the facet, y
     towards its third corner, z above it towards the second pore, from the first corner."""
 
-    corner: Array
-    """(K, 4, 2) m, of the polygon."""
-    corners: Array
-    """(K,) how many it has, 3 or 4."""
+    corner: Array  # (K, 4, 2) m, of the polygon
+    corners: Array  # (K,) how many it has, 3 or 4
     body: Array
     """(K, 5, 5) of the throat's own bodies: x, y, z and radius m, and flatness, 1 of a sphere and
     0 of a wall. There is none where the radius is 0."""
-    part: Array
-    """(K,) flux of the whole throat over that of the polygon."""
+    part: Array  # (K,) flux of the whole throat over that of the polygon
     middle: Array
     """(K, 2) m, the place in the facet that is farthest from its discs; about it beside walls."""
 
@@ -60,16 +57,11 @@ class Shapes(NamedTuple):
 class Sections(NamedTuple):
     """The sections of S sides of throats, n of each side at equal steps of height."""
 
-    throat: Array
-    """(S,) number of the throat among those of a part."""
-    side: Array
-    """(S,) 0 for the side of the first pore, 1 for that of the second."""
-    low: Array
-    """(S,) m, the first section above the facet, on its side."""
-    step: Array
-    """(S,) m between two sections."""
-    many: int
-    """n."""
+    throat: Array  # (S,) number of the throat among those of a part
+    side: Array  # (S,) 0 for the side of the first pore, 1 for that of the second
+    low: Array  # (S,) m, the first section above the facet, on its side
+    step: Array  # (S,) m between two sections
+    many: int  # n
 
 
 # ------------------------------------------------------------------------------------------------
@@ -197,20 +189,13 @@ ON_SIDE = 1e-9
 class RayRoom(NamedTuple):
     """Room for the rays of the discs that the sections of a throat meet, D at most."""
 
-    side: Array
-    """(4, 3) of `set_sides`."""
-    rays: Array
-    """(D, 7, 48) of `aim`."""
-    number: Array
-    """(D,) of rays of each disc; -1 before they are aimed."""
-    longest: Array
-    """(D,) m, the farthest end of the rays of each disc."""
-    which: Array
-    """(D,) the discs that a section meets."""
-    disc: Array
-    """(D, 4): their centres x and y, and radii, m, and flatness."""
-    part: Array
-    """(48,) for `flux_on_rays`."""
+    side: Array  # (4, 3) of `set_sides`
+    rays: Array  # (D, 7, 48) of `aim`
+    number: Array  # (D,) of rays of each disc; -1 before they are aimed
+    longest: Array  # (D,) m, the farthest end of the rays of each disc
+    which: Array  # (D,) the discs that a section meets
+    disc: Array  # (D, 4): their centres x and y, and radii, m, and flatness
+    part: Array  # (48,) for `flux_on_rays`
 
 
 def ray_room(most: int) -> RayRoom:

@@ -58,8 +58,7 @@ def _apex(network: Network, throats: Array, origin: Array, normal: Array, side: 
 class SpheresBeside(NamedTuple):
     """Spheres near K throats, as seen from their facets."""
 
-    first: Array
-    """(K+1,) the first sphere of each throat, and their number N at the end."""
+    first: Array  # (K+1,) the first sphere of each throat, and their number N at the end
     place: Array
     """(N, 5): m along the first edge of the facet, across it towards the third corner, and above
     it towards the second pore, from the first corner to the centre; the radius m, and 1."""

@@ -77,22 +77,15 @@ class ThroatPart(NamedTuple):
     It takes some 0.5 kB a throat.
     """
 
-    throats: slice
-    """Their place among all throats."""
-    shapes: Shapes
-    """Of their sections."""
-    heights: Array
-    """(K, 2) m of the nodes above the facets."""
-    origin: Array
-    """(K, 3) m, the first corner of each facet."""
-    axes: tuple[Array, Array, Array]
-    """Unit vectors (K, 3) of `facet_axes`."""
+    throats: slice  # their place among all throats
+    shapes: Shapes  # of their sections
+    heights: Array  # (K, 2) m of the nodes above the facets
+    origin: Array  # (K, 3) m, the first corner of each facet
+    axes: tuple[Array, Array, Array]  # unit vectors (K, 3) of `facet_axes`
     ends: Array
     """(K, 2) m above the facets, of the lower and the upper end of the prism from node to node."""
-    low: Array
-    """(K, 3) m, lower corners of the boxes around the prisms."""
-    high: Array
-    """(K, 3) m, their upper corners."""
+    low: Array  # (K, 3) m, lower corners of the boxes around the prisms
+    high: Array  # (K, 3) m, their upper corners
 
 
 def parts_of(network: Network) -> Iterator[ThroatPart]:

@@ -194,24 +194,15 @@ SHAKE_SEED = 3_141_592
 class ImagePoints(NamedTuple):
     """M images of n grains, the grains themselves among them."""
 
-    owner: Array
-    """(M,) index of the grain."""
-    position: Array
-    """(M, 3) m, centre of the image."""
-    shift: Array
-    """(M, 3) whole periods by which the image is moved along each axis."""
-    mirror: Array
-    """(M, 3) one of INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE of `spheres.geometry`."""
-    radius: Array
-    """(M,) m."""
-    shaken: Array
-    """(M, 3) m, centre after the shake."""
-    scaled: Array
-    """(M, 3) shaken centre from the low corner of the box, in mean grain radii."""
-    name: Array
-    """(M,) integer of grain and mirror image; images that differ by periods share it."""
-    key: Array
-    """(M,) integer that orders the images by name, then by shift."""
+    owner: Array  # (M,) index of the grain
+    position: Array  # (M, 3) m, centre of the image
+    shift: Array  # (M, 3) whole periods by which the image is moved along each axis
+    mirror: Array  # (M, 3) one of INSIDE, MIRROR_LOW, MIRROR_HIGH, ON_FACE of `spheres.geometry`
+    radius: Array  # (M,) m
+    shaken: Array  # (M, 3) m, centre after the shake
+    scaled: Array  # (M, 3) shaken centre from the low corner of the box, in mean grain radii
+    name: Array  # (M,) integer of grain and mirror image; images that differ by periods share it
+    key: Array  # (M,) integer that orders the images by name, then by shift
 
 
 def make_points(grains: Snapshot, *, periodic: tuple[bool, ...], margin: Array) -> ImagePoints:
@@ -463,24 +454,19 @@ EQUAL_SPREAD = 1e-3
 class Tetrahedra(NamedTuple):
     """P unique tetrahedra between M points."""
 
-    points: ImagePoints
-    """The M points, images of the grains."""
-    vertex: Array
-    """(P, 4) points at the corners."""
+    points: ImagePoints  # the M points, images of the grains
+    vertex: Array  # (P, 4) points at the corners
     neighbour: Array
     """(P, 4) tetrahedron across the facet opposite each corner; -1 where that lies across a period
     or beyond a wall."""
-    centre: Array
-    """(P, 3) m, power centre: the point of equal power to the four grains."""
-    volume: Array
-    """(P,) m3."""
+    centre: Array  # (P, 3) m, power centre: the point of equal power to the four grains
+    volume: Array  # (P,) m3
     flat: Array
     """(P,) whether the volume is below 1e-5 mean radii cubed; the centre is then arbitrary."""
     margin: Array
     """(3,) m, how far beyond the box the spheres reach that must be empty: those about a centre in
     which the centre of another grain would have changed the tetrahedron."""
-    hidden: int
-    """Number of grains without any tetrahedron."""
+    hidden: int  # number of grains without any tetrahedron
 
 
 def make_tetrahedra(

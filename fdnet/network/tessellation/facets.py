@@ -27,16 +27,11 @@ from fdnet.spheres.snapshot import Array, Snapshot
 class Facets(NamedTuple):
     """T facets, each shared by two tetrahedra."""
 
-    pore: Array
-    """(T, 2) the two tetrahedra."""
-    opposite: Array
-    """(T, 2) corner 0 to 3 of either tetrahedron that is not on the facet."""
-    shift: Array
-    """(T, 3) whole periods that bring the second tetrahedron next to the first."""
-    vertex: Array
-    """(T, 3) points at the corners of the facet, those of the first tetrahedron."""
-    unmatched: int
-    """Number of facets away from the mirrored faces that have no partner."""
+    pore: Array  # (T, 2) the two tetrahedra
+    opposite: Array  # (T, 2) corner 0 to 3 of either tetrahedron that is not on the facet
+    shift: Array  # (T, 3) whole periods that bring the second tetrahedron next to the first
+    vertex: Array  # (T, 3) points at the corners of the facet, those of the first tetrahedron
+    unmatched: int  # number of facets away from the mirrored faces that have no partner
 
     def where(self, mask: Array) -> "Facets":
         """The facets for which `mask` (T,) is true."""
@@ -106,18 +101,13 @@ take hours. (Dense packs need 1 to 2 periods, a unit cell 125 images.)"""
 class Tessellation(NamedTuple):
     """Tetrahedra (P) of placed grains and the facets (T) between them."""
 
-    tetrahedra: Tetrahedra
-    """The P unique tetrahedra."""
-    facets: Facets
-    """The T facets that two tetrahedra share."""
-    box: Array
-    """(3, 2) m, lower and upper bound of the specimen."""
-    size: Array
-    """(3,) m, sides of the box."""
+    tetrahedra: Tetrahedra  # the P unique tetrahedra
+    facets: Facets  # the T facets that two tetrahedra share
+    box: Array  # (3, 2) m, lower and upper bound of the specimen
+    size: Array  # (3,) m, sides of the box
     periodic: tuple[bool, bool, bool]
     """Whether the sides x, y and z are periodic; the other faces are mirror planes."""
-    scale: float
-    """m, mean radius of the grains."""
+    scale: float  # m, mean radius of the grains
 
 
 def tessellate(placed: PlacedGrains) -> Tessellation:
@@ -322,14 +312,11 @@ ADOPTION_ROUNDS = 8
 class Polyhedra(NamedTuple):
     """Power centres of the tetrahedra (P), and which tetrahedra share one."""
 
-    centre: Array
-    """(P, 3) m, power centres; a flat tetrahedron has that of a neighbour."""
+    centre: Array  # (P, 3) m, power centres; a flat tetrahedron has that of a neighbour
     heights: Array
     """(T, 2) m, distance of the two centres from their facet, positive on their own side."""
-    group: Array
-    """(P,) number of the polyhedron, equal for all parts of one."""
-    wall: Array
-    """(P, 3) -1 or 1 where the low or high mirrored face cuts the polyhedron, else 0."""
+    group: Array  # (P,) number of the polyhedron, equal for all parts of one
+    wall: Array  # (P, 3) -1 or 1 where the low or high mirrored face cuts the polyhedron, else 0
 
 
 def join_polyhedra(tessellation: Tessellation) -> Polyhedra:
