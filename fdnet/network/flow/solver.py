@@ -320,17 +320,9 @@ MOST_SWEEPS = 30
 class Balance(NamedTuple):
     """Pressures of n nodes and fluxes of K links."""
 
-<<<<<<< HEAD
-    pressure: Array
-    """(n,) over the unit of the jumps."""
-    flux: Array
-    """(K,) from the first to the second end, in units of conductance times jump."""
-    drop: Array
-    """(K,) of the pressure along the links, in units of the jumps."""
-=======
     pressure: Array  # (n,) over the unit of the jumps
     flux: Array  # (K,) from the first to the second end, in units of conductance times jump
->>>>>>> h/form
+    drop: Array  # (K,) of the pressure along the links, in units of the jumps
     defect: float
     """Sum of the imbalances of the nodes over the throughput; it bounds its relative error."""
     method: str  # how the system was solved
