@@ -135,7 +135,7 @@ class ClassInvasion:
     stop_reason: str = ""
 
 
-class Drive(NamedTuple):
+class FirstFlow(NamedTuple):
     """Superficial velocity at the start, m/s, and the resistance of the way beyond the specimen
     over that of the intact specimen."""
 
@@ -143,18 +143,18 @@ class Drive(NamedTuple):
     rest: float
 
 
-def drive_of(case: InvasionCase, scales: InvasionScales, permeability: float) -> Drive:
+def first_flow(case: InvasionCase, scales: InvasionScales, permeability: float) -> FirstFlow:
     """What drives the fluid through a pack of `permeability` m2, by its network.
 
     A velocity that is given says nothing of the way: the specimen is all of it.
     """
     if case.fluid.velocity_m_s is not None:
-        return Drive(scales.darcy_velocity, 0.0)
+        return FirstFlow(scales.darcy_velocity, 0.0)
     given = None if case.well is None else case.well.formation_permeability_m2
     share = 1.0 if given is None else permeability / given
     length = case.size_m[0]
     beyond = max(0.0, path_of(case).viscous - length) / length
-    return Drive(darcy_through(case, scales.porosity, permeability), beyond * share)
+    return FirstFlow(darcy_through(case, scales.porosity, permeability), beyond * share)
 
 
 def velocity_in(

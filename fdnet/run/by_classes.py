@@ -24,7 +24,7 @@ from fdnet.classes.invasion import (
     bed_of,
     cake_permeability,
     cake_resistance,
-    drive_of,
+    first_flow,
     flows_through,
     invade_classes,
     release_of,
@@ -124,7 +124,7 @@ def _course(
     case: InvasionCase, scales: InvasionScales, permeability: float, length: float
 ) -> Course:
     """What drives and ends the invasion, as with spheres in a flow that follows the deposit."""
-    drive = drive_of(case, scales, permeability)
+    drive = first_flow(case, scales, permeability)
     fines, run, physical = case.fines, case.run, scales.force_factor
     return Course(
         velocity=drive.velocity,

@@ -23,7 +23,7 @@ from fdnet.classes.beside_spheres import (
     Stands,
     finer_classes,
 )
-from fdnet.classes.invasion import Drive, drive_of, velocity_in
+from fdnet.classes.invasion import FirstFlow, first_flow, velocity_in
 from fdnet.dem.checkpoint import Checkpoint, entered_by, time_of
 from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
@@ -249,9 +249,9 @@ class NetworkFluid:
             self.finer.recall(path) if path is not None else self.finer.forget()
 
     @cached_property
-    def drive(self) -> Drive:
+    def drive(self) -> FirstFlow:
         """What drives the fluid, the velocity as simulated."""
-        drive = drive_of(self.case, self.scales, self.pack.permeability)
+        drive = first_flow(self.case, self.scales, self.pack.permeability)
         return drive._replace(velocity=drive.velocity * self.scales.force_factor)
 
     def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
