@@ -188,16 +188,13 @@ def read_classes(path: Path, last: Mapping[str, float] | None = None) -> ClassIn
     """The end of an invasion; with `last`, the row of its last update, one beside spheres."""
     with np.load(path) as data:
         solids = Deposits(**{one.name: data[one.name] for one in fields(Deposits)})
-        if last is not None:
-            volumes = np.array([[solids.inside_by_class, solids.passed, solids.cake]])
-            return ClassInvasion(
-                solids=solids, kept=data["kept"], by_class=volumes, rows=(dict(last),)
-            )
-        columns = {name[4:]: data[name].tolist() for name in data.files if name[:4] == "row_"}
-        rows = tuple(rows_of(columns))
-        return ClassInvasion(
-            solids=solids, kept=data["kept"], by_class=data["by_class"], rows=rows
-        )
+        if last is None:
+            columns = {name[4:]: data[name].tolist() for name in data.files if name[:4] == "row_"}
+            rows, by_class = tuple(rows_of(columns)), data["by_class"]
+        else:
+            rows = (dict(last),)
+            by_class = np.array([[solids.inside_by_class, solids.passed, solids.cake]])
+        return ClassInvasion(solids=solids, kept=data["kept"], by_class=by_class, rows=rows)
 
 
 def rows_of(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
