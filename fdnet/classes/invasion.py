@@ -241,6 +241,7 @@ def invade_classes(
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
                 break
             volume *= max(0.2, CHANGE / change)
+            del after  # which is large, before the next try
         wanted = volume * min(max(CHANGE / max(change, 1e-9), 0.3), 2.0)
         come = volume * mud * float(state.streams.fed.sum())
         entered = come - float(np.sum(after.cake - solids.cake))
@@ -248,6 +249,7 @@ def invade_classes(
         crossing = entered / (mud * volume) * velocity / course.velocity
         quiet = quiet + volume / rate if crossing <= course.plug_rate else 0.0
         solids, kept = after, new
+        del what, after
         state = flow_with(kept, state.flow)
         reason = _ended(course, time, quiet, float(solids.supplied.sum()))
     return ClassInvasion(
