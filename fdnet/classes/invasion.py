@@ -29,7 +29,7 @@ from fdnet.classes.transport import Streams, streams_of
 from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.network import Network
-from fdnet.scales.flow import api_permeability, carman_kozeny
+from fdnet.scales.flow import api_permeability, carman_kozeny, darcy_through, path_of
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
@@ -53,7 +53,8 @@ class PackState(NamedTuple):
 def flows_through(network: Network, sieve: Sieve, clean: Array, intact: Flow) -> "PackStateOf":
     """How the fluid flows through a network when the sides of its throats keep some of `clean`.
 
-    `clean` (T,) m3 are the conductances without solids, `intact` is the flow by them. Raises FlowError as `solve_flow` does.
+    `clean` (T,) m3 are the conductances without solids, `intact` is the flow by them.
+    Raises FlowError as `solve_flow` does.
     """
     first = np.unique(network.pore_group, return_index=True)[1]
     whole = sieve.halves.sum(axis=1)
@@ -134,6 +135,28 @@ class ClassInvasion:
     stop_reason: str = ""
 
 
+class FirstFlow(NamedTuple):
+    """Superficial velocity at the start, m/s, and the resistance of the way beyond the specimen
+    over that of the intact specimen."""
+
+    velocity: float
+    rest: float
+
+
+def first_flow(case: InvasionCase, scales: InvasionScales, permeability: float) -> FirstFlow:
+    """What drives the fluid through a pack of `permeability` m2, by its network.
+
+    A velocity that is given says nothing of the way: the specimen is all of it.
+    """
+    if case.fluid.velocity_m_s is not None:
+        return FirstFlow(scales.darcy_velocity, 0.0)
+    given = None if case.well is None else case.well.formation_permeability_m2
+    share = 1.0 if given is None else permeability / given
+    length = case.size_m[0]
+    beyond = max(0.0, path_of(case).viscous - length) / length
+    return FirstFlow(darcy_through(case, scales.porosity, permeability), beyond * share)
+
+
 def velocity_in(
     first: float, rest: float, k_over_k0: float, more: float, gain: float = 0.0
 ) -> float:
@@ -176,7 +199,8 @@ def invade_classes(
             velocity = velocity_in(velocity, course.rest, state.k_over_k0, more)
         by_class.append([solids.inside_by_class, solids.passed, solids.cake])
         supplied = float(solids.supplied.sum())
-        viscosity, inside, passed, before = course.bed.viscosity, *np.sum(by_class[-1], axis=1)
+        inside, passed, in_cake = np.sum(by_class[-1], axis=1)
+        viscosity = course.bed.viscosity
         drop = viscosity * velocity * course.resistance / max(state.k_over_k0, 1e-300)
         rows.append(
             {
@@ -188,7 +212,7 @@ def invade_classes(
                 "supplied_m3": supplied,
                 "invaded_m3": float(inside),
                 "passed_m3": float(passed),
-                "cake_m3": float(before),
+                "cake_m3": float(in_cake),
                 "cake_thickness_m": thickness_of_cake(sieve, solids),
                 "pressure_cake_Pa": viscosity * velocity * cake,
                 "pressure_pack_Pa": drop,
@@ -217,6 +241,7 @@ def invade_classes(
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
                 break
             volume *= max(0.2, CHANGE / change)
+            del after  # which is large, before the next try
         wanted = volume * min(max(CHANGE / max(change, 1e-9), 0.3), 2.0)
         come = volume * mud * float(state.streams.fed.sum())
         entered = come - float(np.sum(after.cake - solids.cake))
@@ -224,6 +249,7 @@ def invade_classes(
         crossing = entered / (mud * volume) * velocity / course.velocity
         quiet = quiet + volume / rate if crossing <= course.plug_rate else 0.0
         solids, kept = after, new
+        del what, after
         state = flow_with(kept, state.flow)
         reason = _ended(course, time, quiet, float(solids.supplied.sum()))
     return ClassInvasion(

@@ -24,6 +24,7 @@ from fdnet.classes.invasion import (
     bed_of,
     cake_permeability,
     cake_resistance,
+    first_flow,
     flows_through,
     invade_classes,
     release_of,
@@ -47,9 +48,9 @@ from fdnet.network.network import Network, build_network
 from fdnet.report.tables import write_rows
 from fdnet.run.finished import HISTORY_COLUMNS, FinishedRun
 from fdnet.run.fluid import FLOW_COLUMNS
-from fdnet.run.folder import RECORD_FORMAT, digests_of
+from fdnet.run.folder import digests_of
 from fdnet.run.records import FinishedInvasion, finer_file
-from fdnet.scales.flow import api_filtrate, darcy_through, path_of
+from fdnet.scales.flow import api_filtrate
 from fdnet.scales.scales import InvasionScales, invasion_scales
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen, resting
 
@@ -113,43 +114,37 @@ def class_model(
         clean=clean,
         sieve=sieve,
         classes=classes,
-        course=_course(case, scales, permeability, sieve),
+        course=_course(case, scales, permeability, sieve.length),
         flow=flows_through(network, sieve, clean, first),
         parcel=case.fines.mean_volume_m3 if case.with_classes else 0.0,
     )
 
 
 def _course(
-    case: InvasionCase, scales: InvasionScales, permeability: float, sieve: Sieve
+    case: InvasionCase, scales: InvasionScales, permeability: float, length: float
 ) -> Course:
     """What drives and ends the invasion, as with spheres in a flow that follows the deposit."""
-    given, rest, velocity = case.fluid.velocity_m_s is not None, 0.0, scales.darcy_velocity
-    if not given:
-        velocity = darcy_through(case, scales.porosity, permeability)
-        around = None if case.well is None else case.well.formation_permeability_m2
-        beyond = max(0.0, path_of(case).viscous - sieve.length) / sieve.length
-        rest = beyond * (1.0 if around is None else permeability / around)
+    drive = first_flow(case, scales, permeability)
     fines, run, physical = case.fines, case.run, scales.force_factor
-    solids = scales.supplied_count * fines.mean_volume_m3 / fines.curve.kept
     return Course(
-        velocity=velocity,
-        resistance=sieve.length / permeability,
-        rest=rest,
+        velocity=drive.velocity,
+        resistance=length / permeability,
+        rest=drive.rest,
         at_rate=case.drag.drive == "rate",
         cake_permeability=cake_permeability(case),
         duration=run.duration_s,
         plug_rate=run.plug_rate,
         plug_time=scales.plug_time * physical,
         cap_time=scales.cap_time * physical,
-        supply=solids,
+        supply=scales.supplied_count * fines.mean_volume_m3 / fines.curve.kept,
         sticking=0.0 if case.invasion is None else case.invasion.sticking,
         release=release_of(case),
-        bed=bed_of(case, scales, velocity),
+        bed=bed_of(case, scales, drive.velocity),
     )
 
 
 # ---- The stage: what it writes, and its record.
-def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) -> dict[str, Any]:
+def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
     """Let the mud in, write what is left of it into `folder`, and return the stage's record."""
     end = invade_classes(model.sieve, model.classes, model.course, model.flow)
     folder.mkdir(parents=True, exist_ok=True)
@@ -161,8 +156,6 @@ def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) ->
     counts = model.counted(end.by_class[-1])
     write_rows(folder / HISTORY, history_of(model.classes, end.by_class, counts.per_row))
     return {
-        "format": RECORD_FORMAT,
-        "digest": case.digest("invade"),
         "method": "network",
         "stop_reason": end.stop_reason,
         "max_overlap": 0.0,
@@ -195,16 +188,13 @@ def read_classes(path: Path, last: Mapping[str, float] | None = None) -> ClassIn
     """The end of an invasion; with `last`, the row of its last update, one beside spheres."""
     with np.load(path) as data:
         solids = Deposits(**{one.name: data[one.name] for one in fields(Deposits)})
-        if last is not None:
-            volumes = np.array([[solids.inside_by_class, solids.passed, solids.cake]])
-            return ClassInvasion(
-                solids=solids, kept=data["kept"], by_class=volumes, rows=(dict(last),)
-            )
-        columns = {name[4:]: data[name].tolist() for name in data.files if name[:4] == "row_"}
-        rows = tuple(rows_of(columns))
-        return ClassInvasion(
-            solids=solids, kept=data["kept"], by_class=data["by_class"], rows=rows
-        )
+        if last is None:
+            columns = {name[4:]: data[name].tolist() for name in data.files if name[:4] == "row_"}
+            rows, by_class = tuple(rows_of(columns)), data["by_class"]
+        else:
+            rows = (dict(last),)
+            by_class = np.array([[solids.inside_by_class, solids.passed, solids.cake]])
+        return ClassInvasion(solids=solids, kept=data["kept"], by_class=by_class, rows=rows)
 
 
 def rows_of(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:

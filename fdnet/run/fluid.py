@@ -23,7 +23,7 @@ from fdnet.classes.beside_spheres import (
     Stands,
     finer_classes,
 )
-from fdnet.classes.invasion import velocity_in
+from fdnet.classes.invasion import FirstFlow, first_flow, velocity_in
 from fdnet.dem.checkpoint import Checkpoint, entered_by, time_of
 from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
@@ -32,7 +32,6 @@ from fdnet.network.fines.crowding import Neighbourhood, local_porosity
 from fdnet.run import network_flow
 from fdnet.run.cake import Standing, standing_cake
 from fdnet.scales.drag import crowd_drag_factor
-from fdnet.scales.flow import darcy_through, path_of
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Snapshot
 
@@ -242,29 +241,10 @@ class NetworkFluid:
             self.finer.recall(path) if path is not None else self.finer.forget()
 
     @cached_property
-    def first_velocity(self) -> float:
-        """Superficial velocity at the start, m/s as simulated.
-
-        Where the overbalance drives it, the pack has its own permeability, by the network.
-        """
-        case, scales = self.case, self.scales
-        darcy = scales.darcy_velocity
-        if case.fluid.velocity_m_s is None:
-            darcy = darcy_through(case, scales.porosity, self.pack.permeability)
-        return darcy * scales.force_factor
-
-    @cached_property
-    def rest(self) -> float:
-        """Resistance of the way beyond the specimen over that of the intact specimen.
-
-        A velocity that is given says nothing of the way: the specimen is all of it.
-        """
-        case, pack, length = self.case, self.pack, self.pack.length
-        if case.fluid.velocity_m_s is not None:
-            return 0.0
-        given = None if case.well is None else case.well.formation_permeability_m2
-        ratio = 1.0 if given is None else pack.permeability / given
-        return max(0.0, path_of(case).viscous - length) / length * ratio
+    def drive(self) -> FirstFlow:
+        """What drives the fluid, the velocity as simulated."""
+        drive = first_flow(self.case, self.scales, self.pack.permeability)
+        return drive._replace(velocity=drive.velocity * self.scales.force_factor)
 
     def forces(self, spheres: Snapshot, moment: Moment) -> FluidForces:
         """What acts on the fines of `spheres`, in their order."""
@@ -307,10 +287,10 @@ class NetworkFluid:
         moving = np.where(within & ~held, crowd, 0.0) / pack.network.area
         slow, gain = float(moving @ shape[:, 0]), float(moving @ fines.velocity[:, 0])
         more = 0.0 if finer is None else self._viscosity * finer.resistance
-        speed, own = self.first_velocity, self._viscosity * pack.length / pack.permeability
+        speed, own = self.drive.velocity, self._viscosity * pack.length / pack.permeability
         if self.case.drag.drive != "rate":
             resists, back = (cake + more + slow) / own, gain / own
-            speed = velocity_in(speed, self.rest, carried.k_over_k0, resists, back)
+            speed = velocity_in(speed, self.drive.rest, carried.k_over_k0, resists, back)
         # drops of pressure as simulated, Pa: of what moves in the pack, and of all that stands
         loose = slow * speed - gain
         drop = self._viscosity * speed * pack.length / pack.permeability / carried.k_over_k0
@@ -347,7 +327,7 @@ class NetworkFluid:
                 "porosity_least": float(np.min(near.porosity, initial=1.0)),
                 "porosity_capped": near.capped,
                 "rate_m3_s": speed / driven * pack.network.area,
-                "rate_over_initial": speed / self.first_velocity,
+                "rate_over_initial": speed / self.drive.velocity,
                 "filtrate_m3": filtrate,
                 "k_over_k0": carried.k_over_k0,
                 "pressure_cake_Pa": (cake + more) * speed / driven,
@@ -381,7 +361,7 @@ class NetworkFluid:
 
     def _before(self, moment: Moment) -> float:
         """Superficial velocity up to this moment, m/s."""
-        return self.first_velocity if moment.before is None else moment.before["velocity_m_s"]
+        return self.drive.velocity if moment.before is None else moment.before["velocity_m_s"]
 
     def _ahead(
         self, fines: Snapshot, rate: Array, carried: network_flow.Carried, moment: Moment

@@ -93,19 +93,19 @@ def test_the_overbalance_is_the_first_drop_of_pressure(fluid):
     viscosity, permeability = fluid.case.fluid.viscosity_Pa_s, fluid.pack.permeability
     for length in (1.6, 4.8):
         other = with_case(fluid, way=f"fluid.darcy_length_mm={length}")
-        pressure = viscosity * other.first_velocity * 1e-3 * length / permeability
+        pressure = viscosity * other.drive.velocity * 1e-3 * length / permeability
         assert pressure == pytest.approx(other.case.fluid.overbalance_Pa, rel=1e-9)
     around = ("well.radius_mm=108.0", "well.drainage_radius_m=100.0")
     around += ("well.formation_permeability_mD=50.0",)
     tight = with_case(fluid, *around, way="fluid.overbalance_MPa=2.0")
     path = 0.108 * np.log(100.0 / 0.108)
     resistance = 1.6e-3 / permeability + (path - 1.6e-3) / (50.0 * 9.869233e-16)
-    velocity = tight.first_velocity / tight.scales.force_factor
+    velocity = tight.drive.velocity / tight.scales.force_factor
     assert viscosity * velocity * resistance == pytest.approx(2e6, rel=1e-9)
-    assert tight.rest == pytest.approx(resistance * permeability / 1.6e-3 - 1.0, rel=1e-9)
+    assert tight.drive.rest == pytest.approx(resistance * permeability / 1.6e-3 - 1.0, rel=1e-9)
     fast = with_case(fluid, "fluid.darcy_law=ergun", way="fluid.darcy_length_mm=1.6")
     darcy = fluid.case.fluid.overbalance_Pa * permeability / viscosity / 1.6e-3
-    assert 0.1 * darcy < fast.first_velocity < 0.99 * darcy
+    assert 0.1 * darcy < fast.drive.velocity < 0.99 * darcy
 
 
 def test_the_rate_follows_the_resistances_in_series(fluid, done):
@@ -114,14 +114,14 @@ def test_the_rate_follows_the_resistances_in_series(fluid, done):
     intact = fluid.case.fluid.viscosity_Pa_s * fluid.pack.length / fluid.pack.permeability
     for other, rest in ((fluid, 0.0), (with_case(fluid, way="fluid.darcy_length_mm=4.8"), 2.0)):
         row = other.forces(standing, FIRST).measures
-        assert other.rest == pytest.approx(rest, abs=1e-9)
+        assert other.drive.rest == pytest.approx(rest, abs=1e-9)
         cake = row["pressure_cake_Pa"] / row["velocity_m_s"] / intact
         share = (1 + rest) / (1 / row["k_over_k0"] + cake + rest)
-        assert row["velocity_m_s"] == pytest.approx(share * other.first_velocity, rel=1e-9)
+        assert row["velocity_m_s"] == pytest.approx(share * other.drive.velocity, rel=1e-9)
         assert row["k_over_k0"] < 0.95
     steady = with_case(fluid, "drag.drive=rate")
     row = steady.forces(standing, FIRST).measures
-    assert row["velocity_m_s"] == steady.first_velocity
+    assert row["velocity_m_s"] == steady.drive.velocity
     carried = carried_with(fluid, deposit_of(done))[0]
     assert carried.ratio.min() < 0.8, "the deposit turns the flow aside"
     assert carried.ratio.max() > 1.05
@@ -152,7 +152,7 @@ def test_a_standing_cake_takes_the_pressure_of_the_summary_and_of_carman_and_koz
 
 def test_fines_that_move_with_the_mud_make_no_cake_and_feel_no_force(fluid):
     place = np.random.default_rng(1).random((200, 3)) * 1e-3 - np.array([3e-3, 0, 0])
-    speed = fluid.first_velocity
+    speed = fluid.drive.velocity
     moving = fines(place, 5e-5, fluid.grains.box, velocity=(speed, 0.0, 0.0))
     forces = fluid.forces(fluid.grains.joined(moving), FIRST)
     assert forces.measures["pressure_cake_Pa"] == 0.0
@@ -179,12 +179,12 @@ def test_forces_on_fines_and_grains_add_up_to_the_drop_of_pressure(fluid, done):
 def test_the_balance_holds_while_fines_move_at_another_pace_than_the_fluid(fluid):
     """Many fines in the pack that are slower or faster than it: exact, for drag is linear."""
     viscosity, pack = fluid.case.fluid.viscosity_Pa_s, fluid.pack
-    whole = pack.length * fluid.first_velocity * viscosity / pack.permeability
+    whole = pack.length * fluid.drive.velocity * viscosity / pack.permeability
     place = np.random.default_rng(2).random((150, 3)) * np.array([1.5e-3, 1e-3, 1e-3])
-    before = {"velocity_m_s": 0.6 * fluid.first_velocity, "time_s": 0.0}
+    before = {"velocity_m_s": 0.6 * fluid.drive.velocity, "time_s": 0.0}
     moment = replace(FIRST, before=before | {"rate_m3_s": 0.0, "filtrate_m3": 0.0})
     for pace in (0.0, 2.0):
-        speed = pace * fluid.first_velocity / fluid.scales.porosity
+        speed = pace * fluid.drive.velocity / fluid.scales.porosity
         moving = fines(place, 2e-5, fluid.grains.box, velocity=(speed, 0.0, 0.0))
         row = replace(fluid, standing=0.0).forces(fluid.grains.joined(moving), moment).measures
         assert row["fines_standing"] == 0
@@ -293,7 +293,7 @@ def test_a_slab_at_constant_rate_raises_the_pressure(go, fluid, tmp_path):
     assert other.case.fines.supply == "slab"
     assert result.stop_reason == "cap"
     first, last = result.updates[0], result.updates[-1]
-    assert last["velocity_m_s"] == first["velocity_m_s"] == other.first_velocity
+    assert last["velocity_m_s"] == first["velocity_m_s"] == other.drive.velocity
     assert last["filtrate_m3"] == pytest.approx(first["rate_m3_s"] * last["time_s"], rel=1e-9)
     assert last["k_over_k0"] < 0.95
     network = first["pressure_pack_Pa"] / last["k_over_k0"]
@@ -326,7 +326,7 @@ def test_a_fine_stands_when_it_is_slower_than_half_of_what_it_was_given(fluid):
     """One that left a fast throat is slow for its place, but as fast as its forces make it."""
     points = np.random.default_rng(4).random((500, 3)) * np.array([1.6e-3, 1e-3, 1e-3])
     place = points[np.linalg.norm(fluid.pack.shape.at(points), axis=1) > 0.5][:3]
-    speed = 1e-3 * fluid.first_velocity
+    speed = 1e-3 * fluid.drive.velocity
     slow = fluid.grains.joined(fines(place, 2e-5, fluid.grains.box, (speed, 0.0, 0.0)))
     given = np.array([1.5 * speed, 4.0 * speed, 0.0])
     assert fluid.forces(slow, FIRST).measures["fines_standing"] == 3
