@@ -168,7 +168,8 @@ class Case(tables.Part):
 class InvasionCase(Case):
     """A pack of grains and the fines that invade it: a `Case` with the table `fines`.
 
-    Make one with `fdnet.read_case` or `fdnet.case_from`.
+    Make one with `fdnet.read_case` or `fdnet.case_from`. Keys are in the unit of their name (mm,
+    MPa, ms), the properties beside them in SI.
 
     Examples:
         >>> import fdnet

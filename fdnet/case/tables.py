@@ -3,8 +3,9 @@
 The keys carry the unit of the user; properties give the same values in SI for everything else.
 """
 
+import inspect
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypedDict, TypeVar
 
 import numpy as np
@@ -465,6 +466,23 @@ class AnalysisChoices(Part):
     def changed(self, **keys: Any) -> "AnalysisChoices":
         """The same choices with `keys` changed. Raises CaseError as `of_pack` does."""
         return type(self).of_pack(**self.model_dump() | keys) if keys else self
+
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def with_visible_choices(function: Function) -> Function:
+    """The function, whose `**choices: Unpack[AnalysisKeys]` is shown as the single keywords."""
+    shown, usual = inspect.signature(function), AnalysisChoices.of_pack()
+    plain = [one for one in shown.parameters.values() if one.kind is not one.VAR_KEYWORD]
+    single = [
+        inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=getattr(usual, name), annotation=kind
+        )
+        for name, kind in AnalysisKeys.__annotations__.items()
+    ]
+    function.__dict__["__signature__"] = shown.replace(parameters=[*plain, *single])
+    return function
 
 
 def _plain_sections(value: Any) -> Any:

@@ -57,6 +57,12 @@ def core_flood(
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
+
+    Examples:
+        >>> import fdnet
+        >>> core = fdnet.core_flood("runs/quick", length=0.076, rate=1.7e-8)
+        >>> 0 < core["k_over_k0"] < 1
+        True
     """
     if (rate is None) == (pressure is None):
         raise CaseError("a core takes a rate or a pressure; give one of --rate and --pressure")

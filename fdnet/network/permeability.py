@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from fdnet.case.tables import M2_PER_MD, AnalysisChoices, AnalysisKeys
+from fdnet.case.tables import M2_PER_MD, AnalysisChoices, AnalysisKeys, with_visible_choices
 from fdnet.errors import CaseError, Doubt, explained
 from fdnet.names import ALL_SPHERES, AUTO, SECTION_ARCHIE, law_pairs
 from fdnet.network.fines.occupancy import Occupancy
@@ -147,6 +147,7 @@ def laws_apart(taken: tuple[str, float], other: tuple[str, float]) -> Iterator[s
         yield Doubt("laws-apart", f"{start}, {name} {k:.4g} m2; one of them finds no open path")
 
 
+@with_visible_choices
 def analyse(
     spheres: Snapshot | tuple[Any, ...],
     damaged: Snapshot | None = None,
@@ -212,6 +213,7 @@ def _say_aloud(result: Analysis) -> None:
             warnings.warn(explained(one), stacklevel=3)
 
 
+@with_visible_choices
 def compare(
     spheres: Snapshot | tuple[Any, ...],
     damaged: Snapshot | None = None,
@@ -338,6 +340,7 @@ class Permeability:
         return frame.drop(columns=twice)
 
 
+@with_visible_choices
 def permeability(
     points: Any,
     radii: Any,

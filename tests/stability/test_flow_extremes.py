@@ -1,19 +1,62 @@
-"""Hard networks: bad conductances, blocked sections, many decades.
-
-Answers against exact arithmetic stand in tests/network/test_flow.py and test_properties.py.
-"""
+"""Hard networks: islands and many decades against exact arithmetic, blocked sections."""
 
 import numpy as np
 import pytest
 from builders import naming
 
 from fdnet.errors import FlowError
-from fdnet.network.flow.flow import solve_flow
+from fdnet.network.flow.flow import INLET, OUTLET, Flow, solve_flow
 from fdnet.network.flow.sections import plane_pressures, whole_permeability
 from fdnet.network.laws.named import LAWS
-from fdnet.network.network import build_network
-from tests.network.networks import chain
+from fdnet.network.network import Network, build_network
+from fdnet.spheres.snapshot import Array
+from tests.network.exact import exact_balance
+from tests.network.networks import chain, network_of
 from tests.network.packs import random_pack
+
+FACES = 4
+
+
+def random_pores(seed: int, *, decades: float, count: int = 18) -> tuple[Network, Array]:
+    """Pores with three links each, four on each face; conductances 0 or 10^0 to 10^decades m3."""
+    rng = np.random.default_rng(seed)
+    position = rng.uniform(0.1, 0.9, (count, 3))
+    position[:FACES, 0], position[FACES : 2 * FACES, 0] = 0.0, 1.0
+    pairs = np.array(
+        [(i, j) for i in range(count) for j in rng.choice(count, 3, replace=False) if i != j]
+    )
+    conductance = 10.0 ** rng.uniform(0, decades, len(pairs)) * (rng.random(len(pairs)) > 0.15)
+    return network_of(position, pairs, [[0, 1]] * 3), conductance
+
+
+def exact_inflow(network: Network, conductance: Array, flow: Flow) -> float:
+    """Inflow in rational arithmetic over the pores that the flow reaches."""
+    x = network.pore_position[:, 0]
+    state = np.where(x <= 0, INLET, np.where(x >= 1, OUTLET, 0))
+    free = (state == 0) & np.isfinite(flow.pore_pressure)
+    node = np.where(state < 0, 0, np.cumsum(free))
+    ends, state = network.throat_pores, state[network.throat_pores]
+    live = (
+        np.all((state < 0) | free[ends], axis=1) & (conductance > 0) & (state[:, 0] != state[:, 1])
+    )
+    live |= np.all(free[ends], axis=1) & (conductance > 0)
+    jump = 1.0 * (state[live, 0] == INLET) - 1.0 * (state[live, 1] == INLET)
+    return exact_balance(node[ends[live]], conductance[live], jump, int(free.sum()) + 1)[0]
+
+
+def test_conductances_from_0_over_sixteen_decades_against_rational_arithmetic():
+    for decades in [0, 8, 16]:
+        with naming(decades):
+            flowing = 0
+            for seed in range(12):
+                network, g = random_pores(seed, decades=decades)
+                flow = solve_flow(network, g)
+                if flow.inflow == 0:
+                    assert "no open path" in flow.reason
+                    continue
+                flowing += 1
+                assert flow.inflow == pytest.approx(exact_inflow(network, g, flow), rel=1e-8)
+            assert flowing > 8
 
 
 def test_one_bad_conductance_among_many_is_refused_and_named():
