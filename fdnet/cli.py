@@ -32,8 +32,7 @@ FORMER = {
 """What took the place of commands that are gone."""
 
 _STOPPED = 130
-_SIGNALS: list[int] = []
-"""Signals to stop that have arrived."""
+_SIGNALS: list[int] = []  # Signals to stop that have arrived
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -170,10 +170,8 @@ VIEW = "install VTK and pyvista with pip install 'fdnet[view]'"
 
 
 PAGE = "docs/reference/warnings.md"
-MIDDLE = 25
-"""Rank of a warning that has no kind, among those by importance."""
-SHOWN = 3
-"""Most warnings on the first screen; the others are in the report and the summary."""
+MIDDLE = 25  # Rank of a warning that has no kind, among those by importance
+SHOWN = 3  # Most warnings on the first screen; the others are in the report and the summary
 
 
 class Doubt(str):

@@ -57,5 +57,4 @@ def law_pairs() -> list[tuple[LawName, DamageLawName]]:
 # ---- The stages of a run, in order.
 Stage = Literal["pack", "invade", "clean_up", "analyse", "report"]
 STAGES: tuple[Stage, ...] = get_args(Stage)
-LIGGGHTS_STAGES = STAGES[:3]
-"""The stages that LIGGGHTS carries out, each in a folder of its name."""
+LIGGGHTS_STAGES = STAGES[:3]  # The stages that LIGGGHTS carries out, each in a folder of its name

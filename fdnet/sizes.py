@@ -153,10 +153,8 @@ def _normal_shares(z: Array) -> Array:
 
 
 # ---- The curve of sizes of some spheres: a law between two cuts, all moments and conversions.
-NUMBER, SURFACE, VOLUME = 0, 2, 3
-"""By what a law counts: the power of the diameter."""
-CELLS = 4096
-"""Cells, equal over ln d, in which a curve is tabulated."""
+NUMBER, SURFACE, VOLUME = 0, 2, 3  # By what a law counts: the power of the diameter
+CELLS = 4096  # Cells, equal over ln d, in which a curve is tabulated
 _WHOLE = 1e-9
 """Share at each end of a law that counts by number or surface, beyond which it is not followed
 when its shares by volume are sought."""

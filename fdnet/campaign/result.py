@@ -32,8 +32,7 @@ SHARES = re.compile(
     r"(^|\.)(k_reduction|.*porosity.*|.*_fraction|share_\w+|.*_share|\w+_lost|\w*over_initial)$"
 )
 """Quantities that are shares of one: a reader sees them in percent."""
-SLAB = re.compile(r"sections\.(\d+)\.(?!section$)(\w+)")
-"""A number of a slab, apart from its own."""
+SLAB = re.compile(r"sections\.(\d+)\.(?!section$)(\w+)")  # A number of a slab, apart from its own
 _NEVER_NEGATIVE = re.compile(r"((?<!\bb_s)_m|_m2|_m3|_s|_count|_over_k0)$|seconds\.")
 """Lengths (but for the coefficient b_s_m), permeabilities, volumes and times. So are counts."""
 

@@ -225,8 +225,7 @@ def with_fines(case: Case) -> InvasionCase:
 
 
 # ---- Which keys of two cases differ, in words.
-MOST_NAMED = 4
-"""Most differing keys that a message names."""
+MOST_NAMED = 4  # Most differing keys that a message names
 
 
 def difference_text(asked: Case, kept: Mapping[str, Any]) -> str:

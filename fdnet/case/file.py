@@ -206,8 +206,7 @@ def nearest(path: str) -> str:
 # for the key with the unit, `viscosity_cP = 10`. A share takes a percentage, `porosity = "38 %"`.
 
 
-FILE = "file"
-"""Key of a table of sizes that names a file with the curve."""
+FILE = "file"  # Key of a table of sizes that names a file with the curve
 
 
 @dataclass(slots=True)
@@ -442,8 +441,7 @@ def _problem(item: dict[str, Any]) -> str:
 
 
 _LONGEST_WORD = 1000
-_MOST_NAMES = 8
-"""Most parts of a dotted key; no key of a case has so many."""
+_MOST_NAMES = 8  # Most parts of a dotted key; no key of a case has so many
 
 
 def set_keys(data: dict[str, Any], assignments: list[str]) -> dict[str, Any]:
@@ -505,8 +503,9 @@ def read_case(
 ) -> Case:
     """The case in the TOML file at `path`, with dotted `assignments` ("key=value") put in.
 
-    `values` does the same with values by dotted key. Raises CaseError when the file cannot be
-    read, is not TOML, or holds an invalid parameter; the message lists every problem.
+    `values` does the same with values by dotted key. Keys are in the unit of their name, such as
+    mm or Pa s, or take a text with a unit. Raises CaseError when the file cannot be read, is not
+    TOML, or holds an invalid parameter; the message lists every problem.
 
     Examples:
         >>> import fdnet

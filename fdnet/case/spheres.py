@@ -37,8 +37,7 @@ from fdnet.sizes import (
     cut_curve,
 )
 
-MOST_POINTS = 1000
-"""Most rows of a measured curve."""
+MOST_POINTS = 1000  # Most rows of a measured curve
 _POWERS = {"volume": VOLUME, "mass": VOLUME, "surface": SURFACE, "number": NUMBER}
 _ROUNDING = 1e-6
 LEAST_RATIO, MOST_RATIO = 1.001, 1000.0

@@ -82,8 +82,7 @@ def still_there(name: Any, removed: Mapping[str, str]) -> Any:
     return name
 
 
-M2_PER_MD = 9.869233e-16
-"""One millidarcy in m2."""
+M2_PER_MD = 9.869233e-16  # One millidarcy in m2
 
 
 class Fluid(Part):
@@ -288,8 +287,7 @@ class Gravity(Part):
     """Weight over drag that is negligible."""
 
 
-DEFAULT_STIFFNESS = 1.0e4
-"""N/m, of the stiffest contact."""
+DEFAULT_STIFFNESS = 1.0e4  # N/m, of the stiffest contact
 
 
 class Run(Part):

@@ -7,8 +7,7 @@ import re
 from decimal import Decimal
 
 _POUND, _INCH = Decimal("0.45359237"), Decimal("0.0254")
-_BARREL = 42 * 231 * _INCH**3
-"""The oil barrel of 42 US gallons of 231 cubic inches, m3."""
+_BARREL = 42 * 231 * _INCH**3  # The oil barrel of 42 US gallons of 231 cubic inches, m3
 _PSI = _POUND * Decimal("9.80665") / _INCH**2
 _DARCY = Decimal("1e-3") * Decimal("1e-4") / Decimal("101325")
 """The darcy, m2: 1 cP times 1 cm2/s over 1 atm (API RP 27)."""

@@ -44,8 +44,7 @@ CLASS_COLUMNS = ("classes_inside_m3", "classes_passed_m3", "classes_cake_m3", "c
 """Volume of all classes in the specimen, beyond it and before it; error of their ledger."""
 
 
-CHANGED = 0.2
-"""Share of the classes at rest that may come before the network is solved anew."""
+CHANGED = 0.2  # Share of the classes at rest that may come before the network is solved anew
 
 
 class Passed(NamedTuple):
@@ -197,8 +196,7 @@ class FinerClasses:
         self.kept = np.ones(self.sieve.ends.shape)
 
 
-HELD = ("in_pores", "attached", "in_throats")
-"""The solids at rest in the specimen."""
+HELD = ("in_pores", "attached", "in_throats")  # The solids at rest in the specimen
 
 
 def finer_classes(

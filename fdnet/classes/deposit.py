@@ -119,8 +119,7 @@ def no_solids(sieve: Sieve, classes: SizeClasses) -> Deposits:
 LOOSE = 0.29
 """Share by which solids in a pore pack less densely, for each of their diameters over the cubic
 root of its void: 0.55 of the void at 0.35, 0.42 at 0.9, 0.38 at 1.2 (docs/theory/size_classes)."""
-FULL = 0.95
-"""Filled share from which a pore begins to act as a bed."""
+FULL = 0.95  # Filled share from which a pore begins to act as a bed
 ADDED, BED = 1210.0, 855.0
 """Resistance that a deposit adds to a side of a throat, times (d l)^1.5 and d^2 l, over the square
 of the share of the void that it takes: measured for large fines, and Carman and Kozeny's bed."""
@@ -395,8 +394,7 @@ def released(
     )
 
 
-LEAST_VOID = 1e-3
-"""Share of its void that a pore keeps at least for fluid."""
+LEAST_VOID = 1e-3  # Share of its void that a pore keeps at least for fluid
 
 
 def fluid_void(sieve: Sieve, solids: Deposits) -> Array:

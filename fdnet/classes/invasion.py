@@ -33,8 +33,7 @@ from fdnet.scales.flow import api_permeability, carman_kozeny, darcy_through, pa
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
-CHANGE = 0.05
-"""Relative change of the resistance of the pack in one step."""
+CHANGE = 0.05  # Relative change of the resistance of the pack in one step
 LEAST_STEP, FIRST_STEP = 1e-6, 0.02
 """m3 of fluid over the pores of the specimen: in the shortest step, and in the first."""
 MOST_STEPS = 5000

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from fdnet.campaign.plan import Plan
     from fdnet.campaign.result import Comparison
 
-SOME_FAILED = 5
-"""Exit code when some of the runs have no result."""
+SOME_FAILED = 5  # Exit code when some of the runs have no result
 
 
 _ENGINE = (

@@ -12,8 +12,7 @@ from fdnet.names import STAGES
 
 THE_CASE, THE_SPHERES, THE_FLOW = "the case", "the spheres", "the flow"
 THE_TEST, THE_PICTURE, LIGGGHTS = "the test", "the picture", "LIGGGHTS"
-OUTPUT, MANY = "output", "many runs"
-"""Titles of the groups of options."""
+OUTPUT, MANY = "output", "many runs"  # Titles of the groups of options
 
 
 class Parser(argparse.ArgumentParser):

@@ -459,8 +459,7 @@ def readable_states(
 
 GRAINS_APART = "grains_apart.txt"
 """File with the group of each grain; no two grains of a group touch."""
-WATCHED = "watched.in"
-"""File by which a coupled deck changes the grains that are watched."""
+WATCHED = "watched.in"  # File by which a coupled deck changes the grains that are watched
 EVERY, MOST_ROWS = 50, 200
 """Steps between two measurements by the deck, and most measurements in a chunk. Each costs about a
 fifth of a step with contacts."""

@@ -218,8 +218,7 @@ def gravity_variables(
 # inside the pack. It acts on the fines alone, as the drag does.
 
 
-BELOW_ZERO = -5e-324
-"""The largest number below 0: a region that ends here holds exactly x < 0."""
+BELOW_ZERO = -5e-324  # The largest number below 0: a region that ends here holds exactly x < 0
 
 
 def drag_variables(case: InvasionCase, scales: InvasionScales) -> dict[str, Any]:

@@ -34,8 +34,7 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 
 STATE = "post/fluid.bin"
 """File in which LIGGGHTS shows the spheres when it asks for the fluid, all digits of them."""
-SUPPLY = "supply"
-"""Folder of the batches."""
+SUPPLY = "supply"  # Folder of the batches
 SCRATCH = "post/contacts.restart"
 """File that a continued deck writes only to store the contacts with the spheres."""
 GIVEN = ("f_uf[1]", "f_uf[2]", "f_uf[3]")
@@ -89,8 +88,7 @@ class DrivingFluid(Protocol):
         """Read it back; begin anew without a path."""
 
 
-SHOWN_COLUMNS = " ".join((COLUMNS, "density", *GIVEN))
-"""Columns of the state that LIGGGHTS shows."""
+SHOWN_COLUMNS = " ".join((COLUMNS, "density", *GIVEN))  # Columns of the state that LIGGGHTS shows
 
 
 def read_state(folder: Path) -> Frame:

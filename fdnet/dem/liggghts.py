@@ -46,10 +46,8 @@ def environment(ranks: int) -> dict[str, str]:
 
 
 # ---- Whether a run of LIGGGHTS really finished; its exit code 0 alone proves nothing.
-END_MARK = "DECK_DONE"
-"""The last line that a deck prints."""
-SCREEN = "screen.txt"
-"""File with what LIGGGHTS printed."""
+END_MARK = "DECK_DONE"  # The last line that a deck prints
+SCREEN = "screen.txt"  # File with what LIGGGHTS printed
 _LONGEST_LINE, _MOST_BAD = 1 << 20, 100
 _BAD_LINE = re.compile(
     r"^(ERROR|Lost atoms)|Signal: |Segmentation fault|Forced restart written|No space left"
@@ -104,10 +102,8 @@ def _advice(bad: list[str]) -> str:
 
 
 # ---- A process of LIGGGHTS: how it is started, watched over and stopped.
-LOCK_PATIENCE = 20.0
-"""Seconds to wait for processes of an earlier run to end."""
-MOST_BYTES = 1 << 29
-"""Largest screen or log of a run; a checkpoint takes some 3 kB of either."""
+LOCK_PATIENCE = 20.0  # Seconds to wait for processes of an earlier run to end
+MOST_BYTES = 1 << 29  # Largest screen or log of a run; a checkpoint takes some 3 kB of either
 
 
 @contextlib.contextmanager
@@ -177,13 +173,10 @@ def started(
 
 
 # ---- The LIGGGHTS binary: where it is, which version it has, and how it is called.
-KNOWN_VERSION = "3.8.0"
-"""The version that fdnet was measured and tested with."""
+KNOWN_VERSION = "3.8.0"  # The version that fdnet was measured and tested with
 LOG = "log.liggghts"
-RANKS = "{ranks}"
-"""Where a template of a launcher has the number of MPI ranks."""
-FEWEST_HANDLES = 64
-"""Fewest open files with which LIGGGHTS and MPI start."""
+RANKS = "{ranks}"  # Where a template of a launcher has the number of MPI ranks
+FEWEST_HANDLES = 64  # Fewest open files with which LIGGGHTS and MPI start
 _PROJECT = Path(__file__).resolve().parents[2]
 
 

@@ -38,12 +38,9 @@ from fdnet.spheres.snapshot import Array, Snapshot, resting
 
 PACK_DAMPING = 0.4 / math.sqrt(2)
 """Damping of two grains over the critical one: 0.8 sqrt(k/m) of their joint mass m/2."""
-RELAX_RUN_STEPS = 2500
-"""Steps between two tests for rest."""
-RADIUS_TOLERANCE = 1e-9
-"""Largest relative difference by the rounding of the stages of growth."""
-REST_RUNS = 4 * PACK_RELAX_STEPS // RELAX_RUN_STEPS
-"""Most tests for rest."""
+RELAX_RUN_STEPS = 2500  # Steps between two tests for rest
+RADIUS_TOLERANCE = 1e-9  # Largest relative difference by the rounding of the stages of growth
+REST_RUNS = 4 * PACK_RELAX_STEPS // RELAX_RUN_STEPS  # Most tests for rest
 
 
 def write_pack_inputs(case: Case, folder: Path, *, count: int, places: int = 0) -> Deck:
@@ -141,10 +138,8 @@ def render_pack(case: Case, *, count: int) -> Deck:
 
 
 # ---- Packs are made until one has the porosity that is asked for.
-POROSITY_TOLERANCE = 0.003
-"""Accepted difference to the porosity of the case."""
-ATTEMPTS = 8
-"""Most packs with different numbers of grains that are tried."""
+POROSITY_TOLERANCE = 0.003  # Accepted difference to the porosity of the case
+ATTEMPTS = 8  # Most packs with different numbers of grains that are tried
 PLACES = 4
 """Most sets of random places from which the same grains are packed, when they do not come to
 rest."""

@@ -25,10 +25,8 @@ from fdnet.sizes import dealt
 from fdnet.spheres.geometry import in_period, wrapped
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, resting
 
-CLEARANCE = 1.02
-"""Fines start at least this many radius sums apart."""
-ROUNDS = 400
-"""Times that a sphere without a place is drawn again, together with the others."""
+CLEARANCE = 1.02  # Fines start at least this many radius sums apart
+ROUNDS = 400  # Times that a sphere without a place is drawn again, together with the others
 LAST_TRIES, LAST_SHARE = 100_000, 0.05
 """Times that each of the last spheres is drawn, and the share of all that may be the last ones."""
 _CLASS, _MOST, _BLOCK = 2**0.25, 50_000, 1_000
@@ -36,8 +34,7 @@ _CLASS, _MOST, _BLOCK = 2**0.25, 50_000, 1_000
 one of the last spheres are drawn at once."""
 
 Indices = NDArray[np.int64]
-NOBODY = (np.empty((0, 3)), np.empty(0))
-"""Places and radii of no sphere."""
+NOBODY = (np.empty((0, 3)), np.empty(0))  # Places and radii of no sphere
 
 
 def places_by_size(
@@ -167,8 +164,7 @@ LOOSEST_CAKE = 0.5
 (Onoda & Liniger 1990)."""
 AT_ONCE = 2
 """Batches present from the start: the one that arrives in the first chunk, and the next."""
-ROUNDING = 1e-9
-"""Share of a chunk's travel that rounding may take from the distance of the mud."""
+ROUNDING = 1e-9  # Share of a chunk's travel that rounding may take from the distance of the mud
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

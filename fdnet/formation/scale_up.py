@@ -132,6 +132,11 @@ def well_invasion(
 
     Raises:
         CaseError: an argument is not above 0, or the specimen cannot tell.
+
+    Examples:
+        >>> import fdnet
+        >>> fdnet.well_invasion("runs/quick", hours=12)["skin"] > 0
+        True
     """
     _above_zero(hours=hours, height=height, pressure=pressure, radius=radius)
 

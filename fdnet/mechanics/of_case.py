@@ -80,10 +80,8 @@ def triaxial_warnings(result: Sheared) -> Iterator[str]:
 
 
 # ---- The material of a case's grains and bonds, and the moduli of its pack.
-QUARTZ_YOUNG = 94.3e9
-"""Young's modulus of quartz, Pa (Shi 2011, section 2.3.1)."""
-MANY_RATTLERS = 0.05
-"""Share of grains that carry nothing above which a result warns."""
+QUARTZ_YOUNG = 94.3e9  # Young's modulus of quartz, Pa (Shi 2011, section 2.3.1)
+MANY_RATTLERS = 0.05  # Share of grains that carry nothing above which a result warns
 
 
 def elastic_moduli(grains: Snapshot, case: Case, *, pressure_Pa: float | None = None) -> Elastic:

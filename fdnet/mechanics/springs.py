@@ -12,10 +12,8 @@ from fdnet.network.flow.solver import dissected, factored
 from fdnet.spheres.geometry import touching_pairs, wrapped
 from fdnet.spheres.snapshot import Array, Snapshot
 
-WALL = -1
-"""Stands for a wall in the place of a second grain."""
-CONTACT_GAP = 1e-6
-"""Two grains touch when their gap is below this share of the smaller diameter."""
+WALL = -1  # Stands for a wall in the place of a second grain
+CONTACT_GAP = 1e-6  # Two grains touch when their gap is below this share of the smaller diameter
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -12,8 +12,7 @@ from fdnet.mechanics import springs
 from fdnet.mechanics.springs import CONTACT_GAP, Joints, Kinematics, PackMaterial
 from fdnet.spheres.snapshot import Array, Snapshot, one_line, resting
 
-SOUND, TENSION, SHEAR = 0, 1, 2
-"""State of a bond: whole, or broken in tension or in shear."""
+SOUND, TENSION, SHEAR = 0, 1, 2  # State of a bond: whole, or broken in tension or in shear
 
 
 class Memory(NamedTuple):
@@ -80,10 +79,8 @@ def keys_of(joints: Joints, count: int) -> Array:
 # the real pack; steps at a constant load follow until it has faded.
 
 
-REACH = 0.02
-"""Gap over the smaller diameter within which a contact may close in a step."""
-NEWTON_STEPS, _HALVES = 12, 12
-"""Most Newton steps and halvings in one load step."""
+REACH = 0.02  # Gap over the smaller diameter within which a contact may close in a step
+NEWTON_STEPS, _HALVES = 12, 12  # Most Newton steps and halvings in one load step
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -319,16 +316,12 @@ def overloaded(loaded: LoadedPack, forces: JointForces) -> tuple[Array, Array]:
 MOST_DRAG, LEAST_DRAG = 1e-1, 1e-4
 """Drag on the motion of grains relative to the strain, over the stiffness of a contact: at the
 first step of each load, and what it falls to as the steps get easy."""
-MOST_RESTS = 60
-"""Most steps at one load before the pack counts as restless."""
-_GROUP = 0.8
-"""Bonds break together whose stress over strength is above this share of the largest."""
+MOST_RESTS = 60  # Most steps at one load before the pack counts as restless
+_GROUP = 0.8  # Bonds break together whose stress over strength is above this share of the largest
 MOST_OVERLAP = 0.05
 """Overlap over diameter that a confining stress may cause; springs hold no more."""
-CONFINING_STEPS = 4
-"""Steps in which the confining stress is put on."""
-PROBE = 0.1
-"""Part of the first load step that gives the initial slope."""
+CONFINING_STEPS = 4  # Steps in which the confining stress is put on
+PROBE = 0.1  # Part of the first load step that gives the initial slope
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,8 +17,7 @@ from fdnet.network.network import Network
 from fdnet.network.tessellation.delaunay import along, less, times
 from fdnet.spheres.snapshot import Array, frozen
 
-CENTRE = 4
-"""The row of the power centre, after those of the four corners of a tetrahedron."""
+CENTRE = 4  # The row of the power centre, after those of the four corners of a tetrahedron
 ON_FACET = 1e-9
 """A node that is nearer to a facet, in lengths of the facet, lies on it: its height is 0."""
 

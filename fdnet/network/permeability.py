@@ -127,8 +127,7 @@ class Analysis(Invaded):
 
 UNLIKELY = ("no-sand", "no-packing", "impossible-permeability", "outside-the-box")
 """Kinds of warnings that a wrong unit of length leads to; `analyse` says them aloud."""
-APART = 1.25
-"""Ratio of two laws' permeabilities from which a warning says that they differ."""
+APART = 1.25  # Ratio of two laws' permeabilities from which a warning says that they differ
 
 
 def laws_apart(taken: tuple[str, float], other: tuple[str, float]) -> Iterator[str]:
@@ -272,8 +271,7 @@ def compare(
 
 
 # ---- One call for spheres in plain arrays.
-THINNEST = 1e-3
-"""Least volume of spheres over that of their box that is no slip of units."""
+THINNEST = 1e-3  # Least volume of spheres over that of their box that is no slip of units
 _DIGITS: Any = {"index": False, "float_format": "{:.4g}".format}
 
 

@@ -19,8 +19,7 @@ from fdnet.network.tessellation.facets import LARGE_CELL, copies_of_cell
 from fdnet.spheres import geometry
 from fdnet.spheres.snapshot import Array, Kind, Snapshot, one_line, sides_of
 
-CONTACT_GAP = 0.01
-"""Spheres this far apart, in diameters of the smaller one, touch."""
+CONTACT_GAP = 0.01  # Spheres this far apart, in diameters of the smaller one, touch
 HELD_BY = 2
 """Fewest contacts of a fine that stands. In cakes that LIGGGHTS made, of one size and of many, it
 gives the fines slower than half the velocity of the fluid best: 2 and 6 % more resistance than
@@ -91,15 +90,12 @@ def cake_thickness(cake: Snapshot) -> float:
 # ---- Whether an answer lies where the method was validated, and whether it can be true at all.
 VALIDATED_POROSITY = (0.25, 0.50)
 """Lowest and highest porosity of the packs with a resolved permeability (docs: accuracy)."""
-SAND = (1e-6, 1e-2)
-"""Smallest and largest diameter of a grain, m, that nobody wonders at."""
+SAND = (1e-6, 1e-2)  # Smallest and largest diameter of a grain, m, that nobody wonders at
 CARMAN_KOZENY = (1 / 20, 5.0)
 """Least and most permeability of any packing over that of Carman and Kozeny; packs and lattices
 of spheres have 0.5 to 1.2 of it."""
-LIKE = 1e-3
-"""A fine that is smaller than the smallest grain by less than this share is as large."""
-PRESSED = 0.2
-"""Part of its radius by which a grain may reach across a wall: pressed grains do."""
+LIKE = 1e-3  # A fine that is smaller than the smallest grain by less than this share is as large
+PRESSED = 0.2  # Part of its radius by which a grain may reach across a wall: pressed grains do
 MANY = 0.25
 """Part of the spheres that would cross the sides of a periodic pack, above which it is said."""
 GAPS, FEWEST, MISSING, LEAST_SIDE = (0.05, 0.5), 5.0, 0.55, 2.5
@@ -233,8 +229,7 @@ def empty_duct_permeability(box: Array, periodic: tuple[bool, bool, bool]) -> fl
 
 
 # ---- What a specimen is, before any law: its network, where its fines sit, its porosity by depth.
-MOVED = 1e-9
-"""A grain that is displaced by more than this, m, has moved."""
+MOVED = 1e-9  # A grain that is displaced by more than this, m, has moved
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -31,8 +31,7 @@ from fdnet.network.specimen import Specimen
 from fdnet.spheres.geometry import make_images
 from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line
 
-Conduct = Callable[[Network], Array]
-"""Conductance (T,) m3 of the throats of a network."""
+Conduct = Callable[[Network], Array]  # Conductance (T,) m3 of the throats of a network
 Kept = TypeVar("Kept")
 Cut = list[Network | NetworkError]
 """The networks of S slabs, each of its own spheres alone, or why these make none."""

@@ -208,8 +208,7 @@ def _respond(
 # what is before it. Lengths are in the spacing along x.
 
 
-SIDE_WALL = -2
-"""Owner of the drag of the side walls."""
+SIDE_WALL = -2  # Owner of the drag of the side walls
 LEAST_DRAG = 1e-6
 
 
@@ -392,8 +391,7 @@ def summed_product(one: Array, other: Array) -> float:
 
 
 MOST_ITERATIONS = 6000
-LARGEST_SLIP = 0.05
-"""Of the reference."""
+LARGEST_SLIP = 0.05  # Of the reference
 
 
 class Problem:
@@ -640,8 +638,7 @@ def extrapolate(coarse: StokesFlow, fine: StokesFlow, *, order: float = 2.0) -> 
     return Estimate(k=fine.k + step, error=abs(step) / 3.0 / (fine.k + step))
 
 
-LEAST_ERROR = 3e-3
-"""Relative error that is always left."""
+LEAST_ERROR = 3e-3  # Relative error that is always left
 
 
 def estimate(coarse: StokesFlow, fine: StokesFlow, *, with_fines: bool) -> Estimate:

@@ -124,8 +124,7 @@ def plain_decades(axes: Any) -> None:
 # ---- Where fines of each size lie: their volume against depth, in classes of size.
 CLASSES, BINS = 3, 24
 COLOURS = ("#56B4E9", "#E69F00", "#D55E00")
-ONE_SIZE = 0.02
-"""Spread of radii over the largest, below which fines count as of one size."""
+ONE_SIZE = 0.02  # Spread of radii over the largest, below which fines count as of one size
 
 
 def fill_deposit(figure: Any, *, fines: Snapshot) -> None:
@@ -180,10 +179,8 @@ def fill_history(figure: Any, *, history: Sequence[Mapping[str, float]]) -> None
 # The pore network from the side: pressure, flux, and what each throat lost of its conductance.
 
 
-SLICE = 1.0
-"""Thickness of the slice that is drawn, in mean grain spacings."""
-LEAST_FLUX = 1e-3
-"""Smallest flux of the scale of colours, over the largest one drawn."""
+SLICE = 1.0  # Thickness of the slice that is drawn, in mean grain spacings
+LEAST_FLUX = 1e-3  # Smallest flux of the scale of colours, over the largest one drawn
 
 
 def fill_network(figure: Any, *, analysis: "Analysis") -> None:

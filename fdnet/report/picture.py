@@ -113,14 +113,10 @@ def drawing_command() -> list[str]:
 
 
 # ---- States of a run as a movie, one after the other (GIF or MP4), or below each other (PNG).
-SECONDS_PER_FRAME = 30.0
-"""Time that drawing one state may take."""
-WIDTH, PANEL_WIDTH = 880, 1200
-"""Pixels of a movie, and of pictures below each other, across."""
-TITLE = 44
-"""Pixels above each of the pictures below each other."""
-LAST_FRAMES = 6
-"""How long the last state stays, in frames."""
+SECONDS_PER_FRAME = 30.0  # Time that drawing one state may take
+WIDTH, PANEL_WIDTH = 880, 1200  # Pixels of a movie, and of pictures below each other, across
+TITLE = 44  # Pixels above each of the pictures below each other
+LAST_FRAMES = 6  # How long the last state stays, in frames
 COLOURS, GIF_COLOURS = 256, 128
 INK = (20, 20, 20)
 
@@ -220,21 +216,16 @@ def _lingering(pictures: Sequence[Any]) -> list[Any]:
 # shown, orange fines and coloured lines among grains of glass. Lengths are in mm.
 
 
-UPSTREAM_SHOWN = 0.12
-"""Share of the length upstream of the face up to which fines are shown."""
+UPSTREAM_SHOWN = 0.12  # Share of the length upstream of the face up to which fines are shown
 DEEPEST = 0.97
 """Share of the fines up to whose depth the colours reach; a few deep ones take the last colour."""
 TRIANGLES = 6e5
 """About half the triangles all fines together may have: memory and time of the picture."""
 FACE_COLOUR, FINE_COLOUR, GRAIN_COLOUR, GLASS_COLOUR = "#0072B2", "#E66100", "#E2E2E2", "#B8B8B8"
-GLASS = 0.10
-"""Opacity of a grain where the flow is shown."""
-NOTHING = 1e-30
-"""Drawn for a flux of 0, which has no logarithm."""
-WIDEST = 0.12
-"""Radius of the pipe of the largest flux, in radii of a grain."""
-THINNEST_PIPE = 0.12
-"""Radius of the pipe of a flux below the colours, over that of the largest."""
+GLASS = 0.10  # Opacity of a grain where the flow is shown
+NOTHING = 1e-30  # Drawn for a flux of 0, which has no logarithm
+WIDEST = 0.12  # Radius of the pipe of the largest flux, in radii of a grain
+THINNEST_PIPE = 0.12  # Radius of the pipe of a flux below the colours, over that of the largest
 FLOW_COLOURS = ["#E4F4CB", "#C7E9B4", "#7FCDBB", "#41B6C4", "#1D91C0", "#225EA8", "#253494"]
 FLOW_COLOURS += ["#081D58"]
 """From the lower to the upper limit (YlGnBu of ColorBrewer)."""

@@ -164,8 +164,7 @@ def answer_sentence(summary: Mapping[str, Any]) -> str:
     return f"{depth} {_skin_words(summary)}" if "skin" in summary else depth
 
 
-TWICE = 2.0
-"""Standard deviations of seeds that are added to a depth before it is acted on."""
+TWICE = 2.0  # Standard deviations of seeds that are added to a depth before it is acted on
 
 
 def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
@@ -245,8 +244,7 @@ def certainty(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 # ---- A run in lines of text, and the same in a notebook; the page shows the same facts.
-WIDTH = 96
-"""Letters in a line of running text."""
+WIDTH = 96  # Letters in a line of running text
 _HEAD = (
     "depth mm", "porosity", "with fines", "k mD", "with fines", "lost %", "in place %", "fines"
 )  # fmt: skip

@@ -29,8 +29,7 @@ class Step(NamedTuple):
 FACE = 2.0
 """Depth behind the face whose loss stands first in an answer, in median grains: a millimetre in
 the sand of the thesis."""
-DAMAGED_FROM = 0.05
-"""Share of its permeability that a layer must have lost to count as damaged."""
+DAMAGED_FROM = 0.05  # Share of its permeability that a layer must have lost to count as damaged
 _TOUCH = 1e-9
 
 
@@ -180,8 +179,7 @@ ABRAMS_SIZE, ABRAMS_SHARE = 1 / 3, 0.05
 FILTER_SAFE, FILTER_FAILS = 5.0, 9.0
 SQRT_SHARE = (0.5 / 0.9) ** 2
 """D50 over D90 where the share finer grows with the square root of the size."""
-SQRT_REACH = 1.5
-"""Factor within which D50 counts as on the line of the square root."""
+SQRT_REACH = 1.5  # Factor within which D50 counts as on the line of the square root
 THROUGH = 0.5
 """Share of the fines that entered and came out again above which the sand lets them through."""
 LARGEST = 0.99
@@ -296,8 +294,7 @@ FULL = Scatter(
     source=f"specimens 1, 2, 4 and 5 of {SOURCE}",
 )
 """Specimens of 1,200 to 1,400 grains, 8 grains wide."""
-QUICK_GRAINS = 500
-"""Number of grains below which a specimen is compared with the quick ones."""
+QUICK_GRAINS = 500  # Number of grains below which a specimen is compared with the quick ones
 
 
 # ---- The keys of summary.json that follow from its other results.

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 RATIOS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, math.inf)
 """Edges of the classes of the diameter of a fine over that of the throat."""
-CLOGGED = 0.1
-"""Share of the clean conductance below which a throat is clogged."""
+CLOGGED = 0.1  # Share of the clean conductance below which a throat is clogged
 COUNTS = ("throats", "with_fines", "blocked", "clogged", "closed")
 """The counts of a row of bridging.csv."""
 

@@ -58,12 +58,9 @@ if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
 
 STATE = "classes.npz"
-MOST_ROWS = 20_000
-"""Spheres that stand for the fines of a run."""
-FIRST_DRAWN = 10_000_000
-"""Numbers of these spheres begin here, behind those of LIGGGHTS."""
-TRIES = 8
-"""Places tried for each of them; the one farthest from the grains is taken."""
+MOST_ROWS = 20_000  # Spheres that stand for the fines of a run
+FIRST_DRAWN = 10_000_000  # Numbers of these spheres begin here, behind those of LIGGGHTS
+TRIES = 8  # Places tried for each of them; the one farthest from the grains is taken
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -23,12 +23,9 @@ from fdnet.scales.drag import crowd_drag_factor
 from fdnet.spheres.geometry import measure_porosity
 from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
-THICK = 3.0
-"""Least thickness in mean diameters of a cake that has a permeability."""
-PACKED = 0.7
-"""Porosity up to which a slice is packed: looser ones are the heaps on top of a cake."""
-LAW = "beetstra"
-"""The law of a cake's resistance, as summary.json names it."""
+THICK = 3.0  # Least thickness in mean diameters of a cake that has a permeability
+PACKED = 0.7  # Porosity up to which a slice is packed: looser ones are the heaps on top of a cake
+LAW = "beetstra"  # The law of a cake's resistance, as summary.json names it
 
 
 class Standing(NamedTuple):

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 
 HISTORY_COLUMNS = ("chunk", "step", "upstream", "invaded", "passed")
 """Of invade/history.csv, which the deck writes."""
-State = Literal["initial", "damaged"]
-"""Without the fines, or with them."""
+State = Literal["initial", "damaged"]  # Without the fines, or with them
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -84,8 +84,7 @@ def mirrored(spheres: Snapshot) -> Snapshot:
 
 
 # ---- What moving fines meet until they are looked at again: the mean over their way.
-PARTS = 4
-"""Parts of the way; in each the fluid is taken half-way."""
+PARTS = 4  # Parts of the way; in each the fluid is taken half-way
 
 
 class Movers(NamedTuple):

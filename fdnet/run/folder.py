@@ -263,8 +263,7 @@ def is_unused(folder: Path) -> bool:
     return all(child.name == LOCK and child.stat().st_size == 0 for child in folder.iterdir())
 
 
-_OWN = (CASE, MANIFEST, UNFINISHED, LOCK, MARK)
-"""Files of fdnet that belong to no stage."""
+_OWN = (CASE, MANIFEST, UNFINISHED, LOCK, MARK)  # Files of fdnet that belong to no stage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

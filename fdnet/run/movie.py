@@ -70,10 +70,8 @@ def colour_limits(values: Array) -> tuple[float, float]:
 
 
 # ---- The movie of a finished run, or a picture of it before and after, from the states it kept.
-LEAST, MOST = 0.5, 30.0
-"""Frames a second that a movie may have."""
-TITLE = "flux of a throat,\n% of the first flow"
-"""Of the colours."""
+LEAST, MOST = 0.5, 30.0  # Frames a second that a movie may have
+TITLE = "flux of a throat,\n% of the first flow"  # Of the colours
 
 
 class DrawnState(NamedTuple):

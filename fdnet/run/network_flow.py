@@ -73,8 +73,7 @@ RENEWED = 0.2
 STEP = 1.0 / 3.0
 """Greatest step between two sections of a throat, in radii of its smallest fine. The analysis
 takes an eighth (docs/validation/solve_lag.csv)."""
-MOVED = 0.01
-"""Way in radii within which a fine that moves is taken to be at one place (`placed`)."""
+MOVED = 0.01  # Way in radii within which a fine that moves is taken to be at one place (`placed`)
 LEAK = 1e-6
 """Share of its clean conductance that a side keeps at least, so that pressures are known beyond
 what the fines close."""

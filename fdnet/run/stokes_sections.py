@@ -28,15 +28,11 @@ from fdnet.spheres.snapshot import Array, Snapshot, one_line
 
 ACROSS_A_GRAIN, ACROSS_A_FINE = 15.0, 3.5
 """Cells of the finer grid across the mean radius of the grains, and of the fines."""
-COARSER = 1.5
-"""Edge of a cell of the coarser grid over that of the finer one."""
-K_TOLERANCE = 1e-3
-"""Of the solves, as of `solve_stokes`."""
+COARSER = 1.5  # Edge of a cell of the coarser grid over that of the finer one
+K_TOLERANCE = 1e-3  # Of the solves, as of `solve_stokes`
 MOST_CELLS = 60_000_000
-BYTES = 200
-"""Memory for each cell."""
-SECONDS = {"initial": 1.2e-5, "damaged": 2.5e-5}
-"""For each cell, on one core."""
+BYTES = 200  # Memory for each cell
+SECONDS = {"initial": 1.2e-5, "damaged": 2.5e-5}  # For each cell, on one core
 KEPT_IN, RESOLVED = "stokes", "sections.csv"
 """Folder in the run folder, and the table of the sections in it."""
 Follow = Callable[[str], None]

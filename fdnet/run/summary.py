@@ -17,8 +17,7 @@ from fdnet.scales.check import every_finding
 if TYPE_CHECKING:
     from fdnet.network.permeability import Analysis
 
-SEEN = 5e-4
-"""Least relative gain that counts: what a table in percent with one digit shows."""
+SEEN = 5e-4  # Least relative gain that counts: what a table in percent with one digit shows
 
 
 def summarise(

@@ -46,8 +46,7 @@ class Finding:
 # periodic sides.
 
 
-WIDTHS = (3.0, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0)
-"""Width over grain diameter."""
+WIDTHS = (3.0, 4.0, 5.0, 6.0, 8.0, 11.0, 16.0)  # Width over grain diameter
 PERIODIC = (-0.366, -0.119, -0.066, -0.053, -0.039, -0.022)
 """Permeability over that of the bulk, less 1, with periodic sides; the widest is the bulk."""
 WALLS = (-0.356, -0.267, -0.193, -0.197, -0.152, -0.117, -0.074)
@@ -70,15 +69,13 @@ def width_error(width: float, *, periodic: bool) -> float:
 # ---- What is odd about the sizes and the supply of a case.
 MOST_WIDTH_ERROR = 0.10
 """Error of the permeability by the width of the specimen, from which it is named."""
-LEAST_LENGTH = 3.0
-"""Length over the mean grain, below which it is named."""
+LEAST_LENGTH = 3.0  # Length over the mean grain, below which it is named
 ABSURD = 10.0
 """Velocity over that at a usual well, from which it is named; the square of it where the case
 gives the velocity or a plug."""
 FINE_SHARE, MOST_FINE_COST = 0.1, 3.0
 """Share of the finest solids, and the time with them over that without, from which it is named."""
-MOST_COARSE = 0.25
-"""Share of the fines wider than every throat, from which it is named."""
+MOST_COARSE = 0.25  # Share of the fines wider than every throat, from which it is named
 WHOLE_GRAIN = 1 - 1e-6
 
 

@@ -31,8 +31,7 @@ from fdnet.scales.pack import target_porosity
 PLUG_SOLIDS = 0.6
 """Volume of fines a unit of face, over the median diameter of the grains, that is ample to plug
 it: the shipped specimens and the well took 0.1 to 0.25 until they did, and go on a plug time."""
-TAKEN_SOLIDS = 0.25
-"""The same, of what has come when the face plugs."""
+TAKEN_SOLIDS = 0.25  # The same, of what has come when the face plugs
 FIRST_BATCHES = 0.3
 """Share of the slab that is there before it is needed, where it comes in batches."""
 MUD_SOLIDS, MUD_PORES, MUD_FINES = 10 * TAKEN_SOLIDS, 2.0, 200_000
@@ -194,8 +193,7 @@ DRAG_WARNING, DRAG_LIMIT = 0.1, 1.0
 refuses the case."""
 LEAST_FACTOR = 0.1
 """Least time step over sqrt(m/k) that is taken so that small fines do not lock between grains."""
-RANDOM_CLOSE = 0.36
-"""Porosity of random close packing of equal spheres (Scott and Kilgour 1969)."""
+RANDOM_CLOSE = 0.36  # Porosity of random close packing of equal spheres (Scott and Kilgour 1969)
 _ROUNDING = 1 + 1e-12
 
 

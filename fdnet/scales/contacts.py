@@ -109,8 +109,7 @@ LEAST: Mapping[str, float] = {"hooke": 1e-6, "hertz": 0.0501}
 """Least restitution by contact model, below which nothing is lowered further. LIGGGHTS's Hertz
 model takes 0.05 and less for an error; for linear contacts it keeps the damping ratio below 1."""
 
-SAFE_FACTOR = 0.2
-"""Time step over sqrt(m/k) that is accepted with any contact."""
+SAFE_FACTOR = 0.2  # Time step over sqrt(m/k) that is accepted with any contact
 LEFT = 0.18
 """Restitution that is left to linear contacts where the flow follows the deposit in longer steps,
 which are stable with it (damping ratio 0.48): drag has stopped a fine before it could rebound."""

@@ -10,10 +10,8 @@ from fdnet.scales.drag import BRIDGING
 from fdnet.scales.pack import PACK_RELAX_STEPS, PACK_STAGE_STEPS, PACK_STAGES, grain_count
 from fdnet.scales.scales import InvasionScales, Scales
 
-STEP_SECONDS = 2.0e-6
-"""Seconds of one step with nothing to do."""
-FIXED_GRAIN_SECONDS, MOVING_GRAIN_SECONDS = 1.3e-8, 1.0e-7
-"""Seconds of one grain in one step."""
+STEP_SECONDS = 2.0e-6  # Seconds of one step with nothing to do
+FIXED_GRAIN_SECONDS, MOVING_GRAIN_SECONDS = 1.3e-8, 1.0e-7  # Seconds of one grain in one step
 FINE_SECONDS = {"held": 1.4e-7, "implicit": 1.4e-7, "viscous": 1.35e-7}
 """Seconds of one fine in one step, contacts and drag, by `drag.scheme`."""
 CACHED_FINES = 8000
@@ -29,8 +27,7 @@ CLASSES_PLUG = 0.25
 """What a volume of finer classes plugs over what it would as spheres: 0.37 by the filtrates of one
 mud with and without its finer half (docs/validation/cuts.csv). A mud with 83 % of finer solids had
 no plug when 1,198 spheres had come, so that it is at most 0.33 there."""
-FALLING_RATE = 0.6
-"""Mean rate over the first, where the deposit slows the flow."""
+FALLING_RATE = 0.6  # Mean rate over the first, where the deposit slows the flow
 WAITING, TRICKLING = 2.0, 1.4
 """Plug times that the face is watched when what plugs it has come; passages of the fluid through
 the box in which single fines still enter, where these count (`run.plug_rate` = 0)."""

@@ -172,18 +172,15 @@ def um(length: float) -> str:
 
 
 # ---- How large a specimen and how much mud a sand and a mud need, and what of them fits a budget.
-SECTION = 2.0
-"""Thickness of a section in mean grain diameters."""
+SECTION = 2.0  # Thickness of a section in mean grain diameters
 SAND_CUTS = (1.0, 2.0, 5.0, 10.0)
 """Shares of the finest sand, percent, that may be left out to clear the coarsest mud."""
 LEAST_SPHERES = 0.05
 """Share of the solids that spheres must be at least: for fewer the network takes all."""
 FINEST_OF_THROAT = 1 / 7
 """Fines below this part of the throats pass (Barkman and Davidson 1972, J. Pet. Tech. 24)."""
-GAP = 0.95
-"""Largest fine over smallest grain."""
-MOST_COARSE = 0.35
-"""Share of the coarsest solids that may be left out."""
+GAP = 0.95  # Largest fine over smallest grain
+MOST_COARSE = 0.35  # Share of the coarsest solids that may be left out
 USUAL_SIZES = {"sand_d10": "0.3 mm", "sand_d50": "0.5 mm", "sand_d90": "0.7 mm"}
 USUAL_SIZES |= {"mud_d10": "60 um", "mud_d50": "80 um", "mud_d90": "100 um"}
 USUAL_SIZES |= {"sand_file": "", "mud_file": ""}

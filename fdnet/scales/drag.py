@@ -91,8 +91,7 @@ def crowd_drag_factor(
 
 
 COEFFICIENT, EXPONENT = 0.15, 0.687
-MOST_REYNOLDS = 800.0
-"""Reynolds number up to which the correlation holds."""
+MOST_REYNOLDS = 800.0  # Reynolds number up to which the correlation holds
 
 
 def drag_factor(reynolds: float) -> float:
@@ -150,10 +149,8 @@ SOLVED = {
 }
 """By diameter of the sphere over that of the tube: force on a sphere at rest over 6 pi mu a V, V
 the velocity of the undisturbed flow on the axis."""
-MOST_RATIO = 0.9
-"""Ratio of diameters up to which the factor is known."""
-_GAP_POWER = 2.5
-"""The factor grows with this power of 1 / (1 - ratio) in a narrow gap."""
+MOST_RATIO = 0.9  # Ratio of diameters up to which the factor is known
+_GAP_POWER = 2.5  # The factor grows with this power of 1 / (1 - ratio) in a narrow gap
 
 
 def held_factor(ratio: float) -> float:
@@ -258,11 +255,9 @@ def pore_width(porosity: float, diameter: float) -> float:
 BRIDGING = 0.5
 """Largest fine over the width of the throats, above which geometry decides where fines stop."""
 
-STOKES_REYNOLDS = 1.0
-"""Reynolds number above which Stokes's drag is more than 15 % too small."""
+STOKES_REYNOLDS = 1.0  # Reynolds number above which Stokes's drag is more than 15 % too small
 
-THROAT_FACTOR = 2.0
-"""Drag in a throat over that of a lone sphere, from which fdnet warns."""
+THROAT_FACTOR = 2.0  # Drag in a throat over that of a lone sphere, from which fdnet warns
 
 
 def reynolds_warnings(

@@ -67,8 +67,7 @@ def radial(radius: float, outer: float) -> Path:
 
 
 # ---- The velocity of the fluid at the formation face: given, or driven by the overbalance.
-INERTIA_WARNING = 0.05
-"""Share of Darcy's velocity that inertia takes, from which "darcy" warns."""
+INERTIA_WARNING = 0.05  # Share of Darcy's velocity that inertia takes, from which "darcy" warns
 USUAL_WELL = (0.108, 100.0)
 """Radius of a well of 8 1/2 inches and a drainage radius, m: the example that warnings give."""
 
@@ -189,8 +188,7 @@ def velocity_warnings(case: InvasionCase, porosity: float, velocity: Velocity) -
 # stops.
 
 
-AUTO_STOKES = 0.1
-"""Impact Stokes number to which "auto" drives the largest fine."""
+AUTO_STOKES = 0.1  # Impact Stokes number to which "auto" drives the largest fine
 STOKES_LIMIT = 0.3
 """Impact Stokes number from which the inertia of fines may matter: no case is driven above it."""
 _ROUNDING = 1 + 1e-9
@@ -250,8 +248,7 @@ def drive_of(case: InvasionCase, velocity: float, relaxation_time: float, free: 
 # V^2 = 2 k dp t (1 - p - c) / (mu c). The paper resists nothing, and there is no spurt.
 
 
-API_PRESSURE, API_TIME, API_AREA = 690e3, 1800.0, 45.8e-4
-"""Pa, s and m2."""
+API_PRESSURE, API_TIME, API_AREA = 690e3, 1800.0, 45.8e-4  # Pa, s and m2
 
 
 def api_filtrate(

@@ -19,12 +19,9 @@ from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import REFERENCE_OVERLAP, Contact, mass_range
 from fdnet.sizes import SURFACE, SizeCurve
 
-GAP = 0.7654
-"""Smallest gap over the shorter of its two rods."""
-RODS = 5000
-"""Rods on the line; the result is within 0.001 of that of many more."""
-EQUAL_SPHERES = 0.6435
-"""Random close packing of equal spheres; every range of sizes fills more."""
+GAP = 0.7654  # Smallest gap over the shorter of its two rods
+RODS = 5000  # Rods on the line; the result is within 0.001 of that of many more
+EQUAL_SPHERES = 0.6435  # Random close packing of equal spheres; every range of sizes fills more
 
 
 def densest_porosity(spheres: Spheres) -> float:
@@ -94,8 +91,7 @@ def close_packing(curve: SizeCurve) -> float:
 
 
 # ---- The measured sizes of a case: diameters of its curves, and what these miss and leave out.
-SHARES = (0.1, 0.5, 0.9)
-"""Shares by volume whose diameters are shown: D10, D50 and D90."""
+SHARES = (0.1, 0.5, 0.9)  # Shares by volume whose diameters are shown: D10, D50 and D90
 MOST_TAIL = 0.02
 """Share of the solids left out at one end of a curve from which a warning names it: the end of a
 curve is cut at 1 % unless the case says otherwise."""

@@ -22,8 +22,7 @@ from fdnet.scales.drag import Push, push_of, reynolds_warnings, throat_warnings,
 from fdnet.scales.flow import Velocity, velocity_of, velocity_warnings
 from fdnet.scales.pack import size_warnings, target_porosity
 
-MOST_STEPS = 2**31 - 1
-"""LIGGGHTS counts the steps of a run in 32 bits."""
+MOST_STEPS = 2**31 - 1  # LIGGGHTS counts the steps of a run in 32 bits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

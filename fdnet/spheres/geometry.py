@@ -12,8 +12,7 @@ from fdnet.spheres.snapshot import Array, Kind, Snapshot, frozen, one_line
 
 _ROUNDING = 1e-6
 """Gap over the smaller diameter below which two spheres may touch, to LIGGGHTS's rounding."""
-_OVERLAP_WARNING = 0.03
-"""Overlap over a diameter above which it is reported."""
+_OVERLAP_WARNING = 0.03  # Overlap over a diameter above which it is reported
 _INSIDE_ROUNDING = 1e-3
 """Part of its radius by which a sphere may reach out of another one and still lie inside of it."""
 

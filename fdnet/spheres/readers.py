@@ -228,8 +228,7 @@ def _chosen(heads: list[Head], cut: list[DumpError], source: str, step: int | No
 
 
 # ---- Spheres from a file of any known format, with grains distinguished from fines.
-_START = 1000
-"""Bytes at the start of a file that tell its format."""
+_START = 1000  # Bytes at the start of a file that tell its format
 _SAME_BOX = 1e-6
 
 

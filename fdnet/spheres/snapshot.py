@@ -11,10 +11,8 @@ from fdnet.errors import CaseError
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
-SKEWED = 1e-9
-"""Most that a cell may lean, over its longest side, and still count as right-angled."""
-MOST_SHOWN = 60
-"""Longest text of one field in `one_line`, characters."""
+SKEWED = 1e-9  # Most that a cell may lean, over its longest side, and still count as right-angled
+MOST_SHOWN = 60  # Longest text of one field in `one_line`, characters
 
 
 def frozen(values: Any, dtype: Any = None) -> Array:
@@ -95,8 +93,7 @@ class Kind(IntEnum):
     FINE = 2
 
 
-KIND_NAMES = {"grain": Kind.GRAIN, "fine": Kind.FINE}
-"""How files and users name the kinds."""
+KIND_NAMES = {"grain": Kind.GRAIN, "fine": Kind.FINE}  # How files and users name the kinds
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -254,8 +251,7 @@ class Snapshot:
         return replace(self, step=other.step, time_s=other.time_s, **both)
 
 
-_OF_EACH = ("id", "kind", "position", "radius", "velocity")
-"""What a snapshot holds of each sphere."""
+_OF_EACH = ("id", "kind", "position", "radius", "velocity")  # What a snapshot holds of each sphere
 
 
 def resting(

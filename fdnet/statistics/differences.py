@@ -17,8 +17,7 @@ from fdnet.statistics.bands import CONFIDENCE, Band
 POWER = 0.80
 """Chance of seeing a difference that is there, for which the number of seeds is computed."""
 MOST_SEEDS = 10_000
-_SAME = 1e-12
-"""Relative spread below which values count as equal."""
+_SAME = 1e-12  # Relative spread below which values count as equal
 
 
 class Difference(NamedTuple):

@@ -120,8 +120,7 @@ def _checked(points: Any) -> Array:
 COARSEST, FINEST, AFFORDED = 10.0, 18.0, 1_000_000
 """Cells across a mean grain where none is given: as many between the first two as keep the grid
 below the third number of cells (`python scripts/validation.py velocity-field`)."""
-SLIP_LEFT = 0.05
-"""Rms velocity left at the walls over the superficial velocity."""
+SLIP_LEFT = 0.05  # Rms velocity left at the walls over the superficial velocity
 UPSTREAM, DOWNSTREAM = 1.0, 0.5
 """Clear fluid before and beyond a specimen that is not periodic along x, in grain diameters."""
 

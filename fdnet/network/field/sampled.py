@@ -16,14 +16,11 @@ from fdnet.network.compiled import compiled
 from fdnet.network.stokes import GridFlow, Lattice
 from fdnet.spheres.snapshot import Array
 
-WALL_REACH = 2.0
-"""R, distance from which a wall no longer shapes the profile, in spacings."""
+WALL_REACH = 2.0  # R, distance from which a wall no longer shapes the profile, in spacings
 PROBED_AT = 0.8
 """Distance from a sphere, in spacings, within which the flow follows the laws at a wall."""
-ALONG = 0.5
-"""Length, in spacings, over which the velocity along a sphere is differentiated."""
-LEAST_PROFILE = 0.02
-"""Least phi of a node whose own velocity is used."""
+ALONG = 0.5  # Length, in spacings, over which the velocity along a sphere is differentiated
+LEAST_PROFILE = 0.02  # Least phi of a node whose own velocity is used
 
 Place = tuple[float, float, float]
 Parts = tuple[Array, Array, Array]

@@ -16,8 +16,7 @@ from fdnet.spheres.snapshot import Array, Snapshot
 REACH = 4.0
 """Radius of the neighbourhood over that of the fine (or over the Sauter mean of all, if that is
 larger). In a random bed of solid fraction 0.6251 the fractions are 0.6245 +- 0.0108."""
-DENSEST = float(np.pi / np.sqrt(18.0))
-"""Solid fraction of the densest packing of equal spheres."""
+DENSEST = float(np.pi / np.sqrt(18.0))  # Solid fraction of the densest packing of equal spheres
 _NODE, _WEIGHT = np.polynomial.legendre.leggauss(4)
 """Gauss and Legendre's rule, exact for the polynomials of degree 7 that are integrated here."""
 

@@ -121,8 +121,7 @@ def _search(
 # (divergence theorem; compare Strobl, Formella and Poeschel 2016, J. Comput. Phys. 311, 158).
 
 
-ROUNDING = 1e-13
-"""A piece of less volume, in cubes of the radius, is rounding."""
+ROUNDING = 1e-13  # A piece of less volume, in cubes of the radius, is rounding
 OTHERS = np.array([(1, 2, 3), (2, 3, 0), (3, 0, 1), (0, 1, 2)])
 """(4, 3) corners of the facet opposite each corner."""
 
@@ -248,8 +247,7 @@ def _shadow(
 
 
 # ---- The parts of tetrahedra inside the box: cut at its mirrored faces into smaller tetrahedra.
-FLAT = 1e-14
-"""Volume over the cube of the longest edge, below which a tetrahedron is flat."""
+FLAT = 1e-14  # Volume over the cube of the longest edge, below which a tetrahedron is flat
 ENDS = {
     1: [(0, 0), (0, 1), (0, 2), (0, 3)],
     2: [(0, 0), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3)],

@@ -17,8 +17,7 @@ from fdnet.network.fines import deposit
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line
 
-GAUSS_POINTS = 10
-"""Points of the Gauss-Legendre rule of `exact_volume`."""
+GAUSS_POINTS = 10  # Points of the Gauss-Legendre rule of `exact_volume`
 
 
 class Pairs(NamedTuple):

@@ -22,8 +22,7 @@ INLET, OUTLET, BETWEEN = -1, -2, 0
 """Where a pore lies: on or beyond the inlet plane, the outlet plane, or between them."""
 PLANE_TOLERANCE = 1e-9
 """A pore within this distance of a plane, in lengths of the box, lies on the plane."""
-SHORTEST_SHARE = 1e-3
-"""Smallest share of its length to which a throat is cut."""
+SHORTEST_SHARE = 1e-3  # Smallest share of its length to which a throat is cut
 
 
 class Links(NamedTuple):
@@ -134,8 +133,7 @@ def _cut_links(network: Network, conductance: Array, span: tuple[float, float]) 
 
 TOLERANCE = 1e-6
 """Largest residual and mass balance, and largest excess of a pressure over its bounds."""
-NOT_SOLVED = "none"
-"""Method of a flow without an open path."""
+NOT_SOLVED = "none"  # Method of a flow without an open path
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -116,8 +116,7 @@ def _pieces(network: Network, flow: Flow, halves: Array | None) -> tuple[Array, 
 
 
 # ---- Thin layers of the first millimetre of a specimen.
-FIRST = 1e-3
-"""Depth that is divided into layers, m: the first millimetre."""
+FIRST = 1e-3  # Depth that is divided into layers, m: the first millimetre
 MOST_LAYERS = 200
 
 
@@ -148,8 +147,7 @@ def layer_edges(box: Array, thickness: float) -> Array:
 
 
 # ---- Permeability, porosity and fines by depth: sections with their own k, and a finer profile.
-FACE_TOLERANCE = 1e-6
-"""Given edges may miss the faces of the box by this share of its length."""
+FACE_TOLERANCE = 1e-6  # Given edges may miss the faces of the box by this share of its length
 DIAMETER_TOLERANCE = 1e-9
 """A section that is thinner than a grain diameter by at most this share of it is not thin."""
 

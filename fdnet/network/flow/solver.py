@@ -18,15 +18,13 @@ from fdnet.network.compiled import compiled
 from fdnet.spheres.snapshot import Array
 
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
-DIRECT_UP_TO = 3_000
-"""Number of nodes up to which the direct solver is used."""
+DIRECT_UP_TO = 3_000  # Number of nodes up to which the direct solver is used
 MOST_DIRECT = 600_000
 """Nodes beyond which a direct solve takes more than 8 GB: some 55 n^1.41 bytes, measured on packs
 of 1e4 to 3e5 pores."""
 CG_TOLERANCE, CG_STEPS = 1e-7, 100
 """Sum of the residuals over that of the sources, and number of steps, of conjugate gradients."""
-STRENGTH = 0.5
-"""Strength of connection in the coarsening of multigrid."""
+STRENGTH = 0.5  # Strength of connection in the coarsening of multigrid
 
 Solve = Callable[[Array, float], Array]
 
@@ -308,12 +306,9 @@ def _root(parent: Array, rise: Array, node: int) -> int:
 # side, the share of each in their flux follows the conductance that they are taken as.
 
 
-CONTRAST = 1e14
-"""Largest conductance of a link over the critical one of its nodes."""
-STEP = 10.0
-"""Factor within which the critical conductance is determined."""
-SETTLED = 1e-9
-"""A balance of less defect is accepted."""
+CONTRAST = 1e14  # Largest conductance of a link over the critical one of its nodes
+STEP = 10.0  # Factor within which the critical conductance is determined
+SETTLED = 1e-9  # A balance of less defect is accepted
 MOST_SWEEPS = 30
 
 

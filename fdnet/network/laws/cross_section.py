@@ -30,14 +30,11 @@ from fdnet.spheres.snapshot import Array
 
 TIP = 1e-2
 """Smallest radius of the disc that a sphere of the facet shows in a section, in its own radii."""
-HUGE = 100.0
-"""Radius of the disc that stands for a wall, in widths of the section."""
-MOST_BODIES = 5
-"""What holds the fluid of a throat: three spheres at the corners and two walls."""
+HUGE = 100.0  # Radius of the disc that stands for a wall, in widths of the section
+MOST_BODIES = 5  # What holds the fluid of a throat: three spheres at the corners and two walls
 DOUBLE_EDGE_SHARE = 0.25
 """Part of the slipping flux that a throat carries which two walls cut between several grains."""
-TOLERANCE = 1e-9
-"""Lengths up to this many mean grain radii are 0."""
+TOLERANCE = 1e-9  # Lengths up to this many mean grain radii are 0
 
 
 class Shapes(NamedTuple):
@@ -178,12 +175,9 @@ def _set_wall(shapes: Shapes, throats: Array, number: int, place: Array, outward
 # ---- The flow through one polygon between any number of discs, summed over rays.
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
 HALF = len(POINTS)
-RAYS = 2 * HALF
-"""Rays of a disc to each far side."""
-NEAR_END = 0.05
-"""Least share of a far side that half of the rays end on."""
-ON_SIDE = 1e-9
-"""A disc centred nearer to a side than this share of the side lies on it."""
+RAYS = 2 * HALF  # Rays of a disc to each far side
+NEAR_END = 0.05  # Least share of a far side that half of the rays end on
+ON_SIDE = 1e-9  # A disc centred nearer to a side than this share of the side lies on it
 
 
 class RayRoom(NamedTuple):

@@ -47,8 +47,7 @@ class DamageLaw(Protocol):
 TORTUOSITY = 2.5
 TEXT_THRESHOLD, CODE_THRESHOLD = 0.40, 0.36
 """Throat porosity below which fines clog: in the text of the thesis, and in its appendix B."""
-BAND = (0.36, 0.80)
-"""Throat porosities between which the places of the fines may decide."""
+BAND = (0.36, 0.80)  # Throat porosities between which the places of the fines may decide
 UNIFORM_DISTANCE = 2.0 / 3.0
 """Mean distance from the axis, over the radius, of an even spread of fines."""
 MIDDLE_BANDS = ("threshold", "position")

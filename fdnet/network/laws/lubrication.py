@@ -29,12 +29,9 @@ from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array
 
-STEPS = 8
-"""Steps in height between the facet and a node."""
-OPEN_STEPS = 4
-"""The same among open sections; with 8, k of slabs changes by 0.2 % on average."""
-THROATS = 20_000
-"""Throats that are worked off at once."""
+STEPS = 8  # Steps in height between the facet and a node
+OPEN_STEPS = 4  # The same among open sections; with 8, k of slabs changes by 0.2 % on average
+THROATS = 20_000  # Throats that are worked off at once
 
 
 def half_resistances(network: Network, *, around: bool = False) -> Array:

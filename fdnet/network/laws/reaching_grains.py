@@ -71,8 +71,7 @@ def sphere_trees(network: Network) -> list[tuple[Array, cKDTree]]:
     return [(kind, cKDTree(network.image_position[kind])) for kind in kinds]
 
 
-NEAREST = 12
-"""Spheres around a facet that are looked for among those of one size."""
+NEAREST = 12  # Spheres around a facet that are looked for among those of one size
 
 
 def with_open_sections(network: Network, part: slice, heights: Array) -> Array:

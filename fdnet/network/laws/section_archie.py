@@ -37,12 +37,9 @@ from fdnet.network.network import LENGTH_FLOOR, Network
 from fdnet.network.nodes import nodes_of
 from fdnet.spheres.snapshot import Array, Snapshot, frozen, one_line, unmoved
 
-EXPONENT = 1.3
-"""Power of the share that the fines leave: Archie's for unconsolidated sand."""
-STEP = 1.0 / 8.0
-"""Greatest step between two sections, in radii of the smallest fine in the throat."""
-LEAST_STEPS = 8
-"""Smallest number of steps between a facet and a node."""
+EXPONENT = 1.3  # Power of the share that the fines leave: Archie's for unconsolidated sand
+STEP = 1.0 / 8.0  # Greatest step between two sections, in radii of the smallest fine in the throat
+LEAST_STEPS = 8  # Smallest number of steps between a facet and a node
 MOST_STEPS = 512
 """Largest number of them, enough for fines of a fiftieth of a grain. Throats with smaller fines
 are counted."""

@@ -15,12 +15,9 @@ from fdnet.network.compiled import bits_of, loops_in_place, loops_inside, number
 from fdnet.spheres.snapshot import Array
 
 LN2 = math.log(2.0)
-EXPONENT = np.uint64(52)
-"""Place of the exponent in the bits of a number."""
-ROOT_HALF = np.uint64(0x3FE6A09E667F3BCD)
-"""Bits of sqrt(1/2)."""
-ONE = np.uint64(1023 << 52)
-"""Bits of 1."""
+EXPONENT = np.uint64(52)  # Place of the exponent in the bits of a number
+ROOT_HALF = np.uint64(0x3FE6A09E667F3BCD)  # Bits of sqrt(1/2)
+ONE = np.uint64(1023 << 52)  # Bits of 1
 WHOLE = np.uint64(0x433 << 52)
 """Bits of 2^52; a small whole number in its last bits is added to it."""
 OFFSET = 2.0**52 + 1023.0
@@ -64,8 +61,7 @@ def log_of(x: float) -> float:
 
 
 TABLE = Path(__file__).with_name("wedge.csv")
-STEEPEST = np.radians(84.0)
-"""Largest angle of the table, rad."""
+STEEPEST = np.radians(84.0)  # Largest angle of the table, rad
 ANGLES = np.linspace(0.0, STEEPEST, 43)
 DISCS = np.linspace(0.0, 1.0, 21)
 
@@ -102,10 +98,8 @@ def ratio_table() -> Array:
 # 0.5 of the cell (docs/physics_network.md, section 8). So 0.6 times 8/3 stands for 8/3 there.
 
 
-WIDENING = 8.0 / 3.0
-"""Factor of da^2 in the resistance above."""
-OPEN_WIDENING = 0.6 * WIDENING
-"""Factor of da^2 in an open section."""
+WIDENING = 8.0 / 3.0  # Factor of da^2 in the resistance above
+OPEN_WIDENING = 0.6 * WIDENING  # Factor of da^2 in an open section
 
 
 def resistance_of(flux: Array, part: Array, step: Array, widening: float) -> Array:

@@ -27,8 +27,7 @@ COINCIDENT = 1e-3
 """Grains that are placed nearer than this, in radii of the smallest grain, coincide."""
 ON_FACE_TOLERANCE = 1e-6
 """A centre within this distance of a mirrored face, in mean grain radii, lies on the face."""
-INSET = 1e-4
-"""Depth inside the box, in mean grain radii, of grains that are placed on an x face."""
+INSET = 1e-4  # Depth inside the box, in mean grain radii, of grains that are placed on an x face
 ITERATIONS = 20
 
 
@@ -186,8 +185,7 @@ def _radius_of_cap(cap: Array, depth: float) -> Array:
 # grain, splits cospherical sets of grains (lattices, prisms cut by a face) alike everywhere.
 
 
-SHAKE = 1e-7
-"""Largest displacement of a point along an axis, in mean grain radii."""
+SHAKE = 1e-7  # Largest displacement of a point along an axis, in mean grain radii
 SHAKE_SEED = 3_141_592
 
 
@@ -443,12 +441,9 @@ def _lens(first: float, second: float, apart: float) -> tuple[float, float]:
 # Along a periodic axis tetrahedra that differ by whole periods are one.
 
 
-FLAT = 1e-5
-"""A tetrahedron of less volume, in mean grain radii cubed, is flat."""
-SAME_CENTRE = 1e-5
-"""Power centres nearer than this, in mean grain radii, are one point."""
-EQUAL_SPREAD = 1e-3
-"""Radii that spread by at most this share of their mean are treated as equal."""
+FLAT = 1e-5  # A tetrahedron of less volume, in mean grain radii cubed, is flat
+SAME_CENTRE = 1e-5  # Power centres nearer than this, in mean grain radii, are one point
+EQUAL_SPREAD = 1e-3  # Radii that spread by at most this share of their mean are treated as equal
 
 
 class Tetrahedra(NamedTuple):

@@ -83,16 +83,12 @@ def share_facets(tetrahedra: Tetrahedra, box: Array, *, periodic: tuple[bool, ..
 FIRST_MARGIN = 3.5
 """Images of grains are first made within this many radii of the largest grain of the box."""
 ROUNDS = 8
-UNMATCHED_FEW = 1e-5
-"""Share of facets without partner that more images are not expected to help."""
-UNMATCHED_SHARE = 1e-3
-"""Share of facets without partner above which the tessellation is refused."""
-LARGE_CELL = 200
-"""Grains from which on a periodic cell is taken as it is."""
+UNMATCHED_FEW = 1e-5  # Share of facets without partner that more images are not expected to help
+UNMATCHED_SHARE = 1e-3  # Share of facets without partner above which the tessellation is refused
+LARGE_CELL = 200  # Grains from which on a periodic cell is taken as it is
 SIDES_OF_CELLS = (0.0, 3.0, 4.0, 5.0, 6.0)
 """Least sides of the cells that are tried, in sides of the cube that one grain has to itself."""
-GRAINS_A_FLAW = 27
-"""A repeated cell may have one facet without partner for so many grains."""
+GRAINS_A_FLAW = 27  # A repeated cell may have one facet without partner for so many grains
 MOST_PERIODS, MOST_IMAGES, IMAGES_A_GRAIN = 64, 50_000, 30
 """Beyond these numbers grains or voids are far larger than the periodic sides, and Qhull would
 take hours. (Dense packs need 1 to 2 periods, a unit cell 125 images.)"""
@@ -195,8 +191,7 @@ def copies_of_cell(
 
 
 # ---- What is measured on one facet after the other, in one compiled pass.
-SIDE_ENDS = (1, 2, 0)
-"""The corner that follows each corner of a triangle."""
+SIDE_ENDS = (1, 2, 0)  # The corner that follows each corner of a triangle
 
 
 @compiled

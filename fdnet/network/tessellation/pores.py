@@ -98,10 +98,8 @@ def _members(
 
 
 # ---- Throats: the open sections of the facets that two pores share.
-LENGTH_FLOOR = 1e-3
-"""Shortest length of a throat, in mean grain radii."""
-TOUCHING = 1e-6
-"""Grains nearer than the sum of their radii by more than this share of it overlap."""
+LENGTH_FLOOR = 1e-3  # Shortest length of a throat, in mean grain radii
+TOUCHING = 1e-6  # Grains nearer than the sum of their radii by more than this share of it overlap
 
 
 def measure_throats(
