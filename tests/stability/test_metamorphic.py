@@ -20,7 +20,7 @@ ROUNDING = 1e-11
 """Largest relative difference of two descriptions, without fines and by the damage laws that do
 not tessellate them."""
 
-RAYS = {"xyz": 5e-10, "yz": 5e-8, "": 2.5e-7}
+RAYS = {"xyz": 5e-10, "yz": 4e-7, "": 2.5e-7}
 """That of all spheres, three times what is measured: a prism that a face cuts is split either way,
 and the spheres around a throat are sought about the centroid of its triangle."""
 

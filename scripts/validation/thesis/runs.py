@@ -12,7 +12,7 @@ import numpy as np
 import tomli_w
 
 import fdnet
-from fdnet.case.case import InvasionCase, with_fines
+from fdnet.case.case import InvasionCase, with_fines, without_old_keys
 from fdnet.case.file import case_from, case_path, read_case, set_keys
 from fdnet.dem.liggghts import find_binary
 from fdnet.errors import CaseError
@@ -154,7 +154,7 @@ def read_state(path: Path) -> State:
     with np.load(path) as file:
         arrays = dict(file)
     text = json.loads(arrays["text"].tobytes())
-    case = with_fines(case_from(tomllib.loads(text["case"]), source=str(path)))
+    case = with_fines(case_from(without_old_keys(tomllib.loads(text["case"])), source=str(path)))
     grains, damaged = (_spheres(arrays, name, case) for name in ("grains", "damaged"))
     return State(case, grains, damaged, text["ending"])
 
