@@ -158,11 +158,8 @@ def _of_run(run: FinishedRun) -> list[HandedUp]:
     if not isinstance(case, InvasionCase) or not summary["supplied_count"]:
         raise CaseError(f"{start}no fines were supplied, so nothing is filtered")
     length, area = case.size_m[0], math.prod(case.size_m[1:])
-    kinds, shut, passed = (
-        _rested(run, case),
-        summary["stop_reason"] == "plugged",
-        summary["passed_count"],
-    )
+    kinds, passed = _rested(run, case), summary["passed_count"]
+    shut = summary["stop_reason"] == "plugged"
     found = round(sum(one.number for one in kinds))
     if found == 0 and passed:
         raise CaseError(

@@ -294,11 +294,8 @@ def _analyse_and_report(session: Session, records: Records) -> dict[str, Any]:
 
 def _analysed(session: Session, records: Records) -> outputs.Results:
     """The specimen before, after the invasion if any, and after its clean-up if any."""
-    case, grains, record = (
-        session.case,
-        packed_grains(session.path, session.case),
-        records["invade"],
-    )
+    case, record = session.case, records["invade"]
+    grains = packed_grains(session.path, case)
     laws = partial(with_default_laws, periodic=case.periodic, options=case.analysis)
     results = partial(outputs.Results, path=session.path, grains=grains)
     if record is None or not isinstance(case, InvasionCase):

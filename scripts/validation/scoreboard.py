@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -368,7 +368,7 @@ def tortuosity(trial: Trial) -> Seen:
     By k, tau^2 = d^2 eps^3 / (72 k (1 - eps)^2) with the surface mean diameter d, which is Kozeny
     and Carman's law with 2 for the shape of the pores. The ways: sum |q| l / sum q l_x.
     """
-    large, ratio = (2, 6.0) if trial.quick else (4 if trial.value < 20 else 1, float(trial.value))
+    large, ratio = (2, 6.0) if trial.quick else (4, float(trial.value))
     pack = mixed(ratio, large, trial.seed, solid=0.4, among=0.55)
     network = build_network(pack, periodic="xyz", walls="slip")
     k, flow = whole_permeability(network, all_conductances(network))
@@ -520,11 +520,21 @@ def judge_11(rows: pd.DataFrame) -> list[Finding]:
 
 # ---- Rows 3 to 5. Fines far too small for spheres.
 
-LATER = "cannot be tried yet: needs the network's size classes"
-BEADS = {"plug": ((0.177, 0.210), 900.0), "plateau": ((0.250, 0.297), 450.0)}
-"""Sieves of the sand, mm, and pressure gradient, kPa/m, by what was seen."""
-COLLOIDS = ((0.5, 0.501), 10.0), (0.004, 0.050)
-"""The same for row 5, with solids of 0.008 to 0.1 of a grain, mm."""
+
+class Flood(NamedTuple):
+    """Fine solids that a flow carries into a sand."""
+
+    sand: tuple[float, float]  # mm, between two sieves
+    solids: tuple[float, float]  # mm, likewise
+    gradient: float  # kPa/m
+
+
+FLOODS = {
+    "plug": Flood((0.177, 0.210), (0.005, 0.010), 900.0),
+    "plateau": Flood((0.250, 0.297), (0.005, 0.010), 450.0),
+    "colloids": Flood((0.500, 0.501), (0.004, 0.050), 10.0),
+}
+"""Of row 3 by what was seen, and of row 5, with solids of 0.008 to 0.1 of a grain."""
 
 
 def beads(trial: Trial) -> Seen:
@@ -533,24 +543,23 @@ def beads(trial: Trial) -> Seen:
     Twenty pore volumes of water bring half a percent of solids at constant pressure, as size
     classes on the network. The concentration of the experiment is not known to us.
     """
-    colloids = trial.value == "colloids"
-    (low, high), gradient = COLLOIDS[0] if colloids else BEADS[trial.value]
-    length, side = 4.0, 2.5 * (low + high)
+    flood = FLOODS[trial.value]
+    length, side = 4.0, 2.5 * sum(flood.sand)
     sieved = {"cut_percent": [0.0, 100.0], "passing_percent": [0.0, 100.0]}
     tables = {
         "name": "beads",
         "seed": trial.seed,
         "box": {"size_mm": [length, side, side], "sides": "periodic"},
-        "grains": {"sizes": {**sieved, "size_mm": [low, high]}, "porosity": 0.38},
+        "grains": {"sizes": {**sieved, "size_mm": list(flood.sand)}, "porosity": 0.38},
         "fines": {
-            "sizes": {**sieved, "size_mm": COLLOIDS[1] if colloids else [0.005, 0.010]},
+            "sizes": {**sieved, "size_mm": list(flood.solids)},
             "concentration": 0.005,
             "slab_mm": 20 * 0.38 * length,
         },
         "fluid": {
             "viscosity_cP": 1.0,
             "density_kg_m3": 998.0,
-            "overbalance_MPa": 1e-6 * gradient * length,
+            "overbalance_MPa": 1e-6 * flood.gradient * length,
             "darcy_length_mm": length,
         },
         "invasion": {"method": "network", "classes": 3},
@@ -564,17 +573,17 @@ def beads(trial: Trial) -> Seen:
 
 
 def judge_beads(rows: pd.DataFrame) -> list[Finding]:
-    """Means over the packs; without rows, that they are missing."""
+    """Means over the packs."""
     lines, source = [], "Gruesbeck and Collins 1982"
-    for value, ((low, high), gradient) in BEADS.items():
+    for value in ("plug", "plateau"):
         own = rows[rows.value == value].groupby("quantity")["observed"].apply(mean_band)
-        grains = f"{1e3 * low:.0f}-{1e3 * high:.0f} µm, {gradient:g} kPa/m"
+        if own.empty:
+            continue
+        low, high = FLOODS[value].sand
+        grains = f"{1e3 * low:.0f}-{1e3 * high:.0f} µm, {FLOODS[value].gradient:g} kPa/m"
         what = f"3: beads of 5-10 µm in {grains}"
         plug = value == "plug"
         number = "deposit at the inlet, k → 0" if plug else "even deposit, k to a plateau"
-        if own.empty:
-            lines.append(Finding(what, number, source, "-", math.nan, LATER))
-            continue
         (left, half), (first, _) = own["k over k0"], own["first quarter"]
         band = f" ± {half:.2f}" if math.isfinite(half) else ""
         first_quarter = f"{100 * first:.0f} % of the deposit in the first quarter"
