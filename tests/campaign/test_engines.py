@@ -39,11 +39,19 @@ def words(folder: Path, engine: str, *more: str) -> list[str]:
 
 
 def started(folder: Path, engine: str, *more: str) -> subprocess.Popen:
-    """fdnet as a process of its own, once both runs have called LIGGGHTS, which then waits."""
+    """fdnet as a process of its own, once both runs have called LIGGGHTS, which then waits.
+
+    It hears Ctrl-C also where the shell has switched it off for these tests, as with `&`.
+    """
     mark = folder / "called"
     fake = fake_liggghts(folder / "lmp", f"echo $$ >> '{mark}'\nexec sleep 100")
     command = [sys.executable, "-m", "fdnet.cli", *words(folder, engine, "--liggghts", fake)]
-    process = subprocess.Popen([*command, *more], stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [*command, *more],
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
     end = time.monotonic() + 60
     while time.monotonic() < end and not (mark.exists() and len(mark.read_text().split()) == 2):
         time.sleep(0.1)
