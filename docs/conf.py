@@ -29,6 +29,7 @@ smartquotes_action = "D"  # dashes alone, quotation marks stay straight
 nitpicky = True
 nitpick_ignore_regex = [("py:class", r".*")]  # types in signatures, of ours and of others
 
+smartquotes_action = "qe"  # no dashes: an option keeps its two hyphens
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_block", "colon_fence", "deflist", "dollarmath"]
 
