@@ -166,8 +166,7 @@ def _stop(running: Iterable[subprocess.Popen], kill: Callable[..., None], number
 # ---- The pool: some processes at a time on this machine, nothing else needed.
 def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Callable[..., None]) -> None:
     """Run the tasks, `jobs` at a time; one that fails stops only those that need what it makes."""
-    waiting, running, full = list(tasks), dict[str, subprocess.Popen](), False
-    failed: set[str] = set()
+    waiting, running, full, failed = list(tasks), dict[str, subprocess.Popen](), False, set[str]()
     # The kernel sends SIGTERM when the parent dies, however it dies (PR_SET_PDEATHSIG).
     dies_with_parent = partial(ctypes.CDLL(None).prctl, 1, signal.SIGTERM, 0, 0, 0)
     try:
@@ -203,8 +202,7 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Callable[...,
 SNAKEFILE = str(resources.files("fdnet.campaign").joinpath("Snakefile"))
 _CONFIG = f"{LOGS}/snakemake.json"
 _REASON = re.compile(
-    r"^(?!.*(?:check log file|Error in rule|Look above)).*(?:[Ee]rror|Exception|failed|locked).*$",
-    re.MULTILINE,
+    r"(?m)^(?!.*(?:check log file|Error in rule|Look above)).*(?:rror|Exception|failed|locked).*"
 )
 
 
@@ -244,8 +242,10 @@ def _run_snakemake(
         _stop([process], os.killpg, signal.SIGINT)
         os.truncate(lock, 0)
     if process.returncode and not any(last_words(_log(path, task.name)) for task in tasks):
-        lines = _REASON.findall(log.read_text("utf-8", "replace"))
-        reasons = " | ".join(dict.fromkeys(line.strip() for line in lines))[:1000]
+        said = log.read_text("utf-8", "replace")
+        for job in re.findall(r"SLURM jobid \S+ \(log: (.+)\)", said)[-1:]:  # what it says itself
+            said = Path(job).read_text("utf-8", "replace") + said if Path(job).exists() else said
+        reasons = " | ".join(dict.fromkeys(map(str.strip, _REASON.findall(said))))[:1000]
         problem = f"Snakemake ended with exit code {process.returncode} before any run"
         raise CaseError(f"{log}: {problem}: {reasons or last_words(log)}")
 

@@ -75,6 +75,14 @@ def _lives(number: int) -> bool:
         return False
 
 
+def by_hand(out: Path, *more: str) -> str:
+    """What Snakemake says, called with the Snakefile in the folder of a plan."""
+    call = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--cores", "2", *more]
+    done = subprocess.run(call, cwd=out, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
 @pytest.mark.liggghts
 @needs_snakemake
 def test_one_call_of_snakemake_ends_by_itself_with_its_page(tmp_path, capsys):
@@ -91,10 +99,8 @@ def test_one_call_of_snakemake_ends_by_itself_with_its_page(tmp_path, capsys):
     assert main(words(tmp_path, "snakemake")) == 0
     assert "to do" not in capsys.readouterr().err
     page = (out / "compare.html").read_bytes()
-    (out / "compare.html").unlink()
-    by_hand = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--cores", "2"]
-    done = subprocess.run(by_hand, cwd=out, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    (out / "compare.html").write_text("of another day")
+    by_hand(out)
     assert (out / "compare.html").read_bytes() == page
     assert {p: p.stat().st_mtime_ns for p in out.glob("runs/*/manifest.json")} == before
 
@@ -138,10 +144,14 @@ def test_a_snakemake_that_outlives_fdnet_is_named_and_no_seed_has_failed(tmp_pat
 
 @needs_snakemake
 def test_the_lock_of_another_snakemake_is_respected(tmp_path, capsys):
-    """One that fdnet did not start: its lock stands without a word in the lock of fdnet."""
+    """One that fdnet did not start: its lock stands without a word in the lock of fdnet.
+
+    By hand it does the runs of a plan, also where there is a page of nothing.
+    """
     assert main([*words(tmp_path, "snakemake"), "--gather"]) == 5
+    assert re.search(r"run +2\n", by_hand(tmp_path / "out", "--dry-run"))
     locks = tmp_path / "out/.snakemake/locks"
-    locks.mkdir(parents=True)
+    locks.mkdir(parents=True, exist_ok=True)
     (locks / "0.output.lock").write_text("runs/tiny-seed-1/manifest.json\n")
     capsys.readouterr()
     fake = fake_liggghts(tmp_path / "lmp", "exit 1")
