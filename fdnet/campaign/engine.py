@@ -216,8 +216,7 @@ def _run_snakemake(
 ) -> None:
     """Run what is missing as jobs of Snakemake, which cancels them when it is stopped by SIGINT.
 
-    It inherits the lock of the folder and its name stands in it, so that no other call works there
-    while it lives, also when this process is killed.
+    It inherits the folder's lock, in which it is named: no other call works while either lives.
     """
     write_text(path / _CONFIG, json.dumps({"options": how.options}))
     words, log = _snakemake_words(how, plan), _log(path, "snakemake")
@@ -255,6 +254,7 @@ def _snakemake_words(how: HowToRun, plan: Plan) -> list[str]:
     words += ["--until", "run", "--keep-going", "--rerun-incomplete"]
     if how.engine == "snakemake":
         return [*words, "--cores", str(how.jobs * plan.ranks)]
+    words = ["env", "-u", "SLURM_JOB_ID", *words]  # in a job the executor drops SLURM_CONF
     words += ["--executor", "slurm", "--jobs", str(how.jobs), "--latency-wait", "30"]
     with contextlib.suppress(OSError):  # without accounting sacct would see no job end
         if subprocess.run(["sacct", "-X"], capture_output=True, check=False).returncode:
