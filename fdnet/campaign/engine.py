@@ -59,9 +59,8 @@ class HowToRun:
     def options(self) -> list[str]:
         """Options of `fdnet run` that are not those of the plan."""
         path = self.liggghts and str(Path(self.liggghts).expanduser().absolute())
-        timeout = None if self.timeout is None else repr(self.timeout)
-        given = {"--liggghts": path, "--launcher": self.launcher, "--timeout": timeout}
-        return [word for name, value in given.items() if value for word in (name, value)]
+        given = {"--liggghts": path, "--launcher": self.launcher, "--timeout": self.timeout}
+        return [str(word) for name, value in given.items() if value for word in (name, value)]
 
     def refuse(self) -> None:
         """Raise CaseError where Snakemake is asked for and not installed."""
@@ -218,8 +217,9 @@ def _run_snakemake(
 
     It inherits the folder's lock, in which it is named: no other call works while either lives.
     """
-    write_text(path / _CONFIG, json.dumps({"options": how.options}))
     words, log = _snakemake_words(how, plan), _log(path, "snakemake")
+    config = {"options": how.options, "slurm_conf": os.environ.get("SLURM_CONF")}
+    write_text(path / _CONFIG, json.dumps(config))
     if os.pread(lock, 1, 0) and any(path.glob(".snakemake/locks/*")):
         how.say("an earlier Snakemake was killed here; its lock is removed")
         _start([*words, "--unlock"], path, log).wait()
