@@ -152,7 +152,7 @@ def test_the_lock_of_another_snakemake_is_respected(tmp_path, capsys):
     assert main([*words(tmp_path, "snakemake"), "--gather"]) == 5
     said = by_hand(tmp_path / "out", "--dry-run")
     assert re.search(r"run +2\n", said)
-    assert len(re.findall(r"cpus_per_task=1, mpi=$", said, re.MULTILINE)) == 2
+    assert len(re.findall(r"cpus_per_task=1, mpi=, nodes=1$", said, re.MULTILINE)) == 2
     locks = tmp_path / "out/.snakemake/locks"
     locks.mkdir(parents=True, exist_ok=True)
     (locks / "0.output.lock").write_text("runs/tiny-seed-1/manifest.json\n")
