@@ -7,7 +7,8 @@ each, or one for several of them where there would be more than `MOST_ROWS`.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -34,19 +35,13 @@ from fdnet.errors import Doubt, FlowError, explained
 from fdnet.files import replacing
 from fdnet.names import SIZE_CLASSES
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy, ratio
-from fdnet.network.flow.flow import solve_flow
-from fdnet.network.flow.sections import (
-    Layers,
-    inplace_permeability,
-    layer_edges,
-    plane_pressures,
-    reduction,
-    slab_permeability,
-)
+from fdnet.network.flow.flow import Flow, solve_flow
+from fdnet.network.flow.sections import Layers, inplace_permeability, reduction, slab_permeability
 from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.network import Network, build_network
+from fdnet.network.states import State, make_layers
 from fdnet.report.tables import write_rows
-from fdnet.run.finished import HISTORY_COLUMNS, FinishedRun
+from fdnet.run.finished import FinishedRun
 from fdnet.run.fluid import FLOW_COLUMNS
 from fdnet.run.folder import digests_of
 from fdnet.run.records import FinishedInvasion, finer_file
@@ -61,6 +56,9 @@ STATE = "classes.npz"
 MOST_ROWS = 20_000  # Spheres that stand for the fines of a run
 FIRST_DRAWN = 10_000_000  # Numbers of these spheres begin here, behind those of LIGGGHTS
 TRIES = 8  # Places tried for each of them; the one farthest from the grains is taken
+MOST_STATES, MOST_NUMBERS, NEVER = 23, 20_000_000, 10**9
+"""States on the way from which an invasion is drawn, numbers that they may take while it goes on,
+and the steps between two where these are too many."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -68,20 +66,43 @@ class ClassModel:
     """A pack as the fast model sees it; `parcel` m3 is drawn as one sphere at least."""
 
     network: Network
-    clean: Array
     sieve: Sieve
     classes: SizeClasses
     course: Course
     flow: PackStateOf
     parcel: float
 
-    def counted(self, volumes: Array) -> "Counts":
-        """Solids (3, C) m3 inside, passed and in the cake as counts, each rounded."""
+    def counted(self, by_class: Array) -> "Counts":
+        """Solids (S, 3, C) m3 inside, passed and in the cake at S steps as counts, rounded."""
         own = self.classes.volume
-        parcel = max(self.parcel, float(volumes.sum()) / MOST_ROWS)
+        parcel = max(self.parcel, float(by_class[-1].sum()) / MOST_ROWS)
         per_row = np.maximum(np.ceil(parcel / own * (1.0 - 1e-9)), 1.0)
-        invaded, passed, upstream = np.rint(volumes / own / per_row).astype(int)
-        return Counts(per_row=per_row, invaded=invaded, passed=passed, upstream=upstream)
+        rows = np.rint(by_class / own / per_row).astype(int)
+        return Counts(per_row, rows, *rows[-1])
+
+
+class Counts(NamedTuple):
+    """Fines of each class (C), in rows of so many fines."""
+
+    per_row: Array  # (C,) fines that a row stands for
+    rows: Array  # (S, 3, C) inside the specimen, beyond and before it at each step
+    invaded: Array  # (C,) rows inside at the end
+    passed: Array  # (C,) that left through the outlet
+    upstream: Array  # (C,) before the face
+
+    @property
+    def supplied(self) -> Array:
+        """(C,) rows of all."""
+        return self.rows[-1].sum(axis=0)
+
+    @property
+    def history(self) -> list[Checkpoint]:
+        """The counts of each step, as LIGGGHTS writes them."""
+        totals = enumerate(self.rows.sum(axis=2).tolist())
+        return [
+            Checkpoint(step + 1, step, upstream, invaded, passed, 0, 0, 0)
+            for step, (invaded, passed, upstream) in totals
+        ]
 
 
 def class_model(
@@ -104,28 +125,12 @@ def class_model(
         )
     sieve = sieve_of(network, halves, first.throat_flux)
     below = case.fines.finest_m if case.with_classes else math.inf
-    classes = mud_classes(case.fines, choices.classes, below=below)
     permeability = first.inflow * sieve.length / sieve.area
-    return ClassModel(
-        network=network,
-        clean=clean,
-        sieve=sieve,
-        classes=classes,
-        course=_course(case, scales, permeability, sieve.length),
-        flow=flows_through(network, sieve, clean, first),
-        parcel=case.fines.mean_volume_m3 if case.with_classes else 0.0,
-    )
-
-
-def _course(
-    case: InvasionCase, scales: InvasionScales, permeability: float, length: float
-) -> Course:
-    """What drives and ends the invasion, as with spheres in a flow that follows the deposit."""
     drive = first_flow(case, scales, permeability)
     fines, run, physical = case.fines, case.run, scales.force_factor
-    return Course(
+    course = Course(
         velocity=drive.velocity,
-        resistance=length / permeability,
+        resistance=sieve.length / permeability,
         rest=drive.rest,
         at_rate=case.drag.drive == "rate",
         cake_permeability=cake_permeability(case),
@@ -134,24 +139,38 @@ def _course(
         plug_time=scales.plug_time * physical,
         cap_time=scales.cap_time * physical,
         supply=scales.supplied_count * fines.mean_volume_m3 / fines.curve.kept,
-        sticking=0.0 if case.invasion is None else case.invasion.sticking,
+        sticking=choices.sticking,
         release=release_of(case),
         bed=bed_of(case, scales, drive.velocity),
+    )
+    return ClassModel(
+        network=network,
+        sieve=sieve,
+        classes=mud_classes(fines, choices.classes, below=below),
+        course=course,
+        flow=flows_through(network, sieve, clean, first),
+        parcel=fines.mean_volume_m3 if case.with_classes else 0.0,
     )
 
 
 # ---- The stage: what it writes, and its record.
-def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
+def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) -> dict[str, Any]:
     """Let the mud in, write what is left of it into `folder`, and return the stage's record."""
-    end = invade_classes(model.sieve, model.classes, model.course, model.flow)
-    folder.mkdir(parents=True, exist_ok=True)
+    places, classes = len(model.sieve.void) + len(model.sieve.ends), len(model.classes.diameter)
+    seen = OnTheWay(every=1 if MOST_STATES * places * classes <= MOST_NUMBERS else NEVER)
+    end = invade_classes(model.sieve, model.classes, model.course, model.flow, watch=seen.watch)
+    counts = model.counted(end.by_class)
     arrays = {one.name: getattr(end.solids, one.name) for one in fields(end.solids)}
     arrays |= {f"row_{key}": np.array([row[key] for row in end.rows]) for key in end.rows[0]}
     arrays |= {"kept": end.kept, "by_class": end.by_class}
+    arrays |= states_on_the_way(case, model, end, counts, seen)
+    folder.mkdir(parents=True, exist_ok=True)
     with replacing(folder / STATE) as part:
         np.savez_compressed(part, **arrays)
-    counts = model.counted(end.by_class[-1])
-    write_rows(folder / HISTORY, history_of(model.classes, end.by_class, counts.per_row))
+    write_rows(folder / HISTORY, [one._asdict() for one in counts.history])
+    left_out = ["the motion of single fines: size classes on the pore network instead"]
+    if seen.every == NEVER:
+        left_out.append("states on the way: the specimen is too large to keep them")
     return {
         "method": "network",
         "stop_reason": end.stop_reason,
@@ -164,15 +183,14 @@ def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
         "ranks": 1,
         "files": digests_of(folder, [HISTORY, STATE]),
         "runs": [],
-        "left_out": ["the motion of single fines: size classes on the pore network instead"],
+        "left_out": left_out,
     }
 
 
 def all_is_cake(model: ClassModel) -> Iterator[str]:
     """Classes that no throat lets in, in words."""
-    widest = float(model.sieve.passage.max())
-    if np.any(wide := model.classes.low >= widest):
-        own = model.classes
+    widest, own = float(model.sieve.passage.max()), model.classes
+    if np.any(wide := own.low >= widest):
         yield Doubt(
             "all-is-cake",
             f"fines of {1e6 * own.low[wide].min():.3g} to {1e6 * own.high[wide].max():.3g} µm are "
@@ -199,61 +217,30 @@ def rows_of(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
-# ---- Volumes as counts of fines, and fines as spheres.
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Counts:
-    """Fines of each class (C), in rows of `per_row` fines."""
-
-    per_row: Array  # (C,) fines that a row stands for
-    invaded: Array  # (C,) rows inside the specimen
-    passed: Array  # (C,) rows that left through the outlet
-    upstream: Array  # (C,) rows before the face
-
-    @property
-    def supplied(self) -> Array:
-        """(C,) rows of all."""
-        return self.invaded + self.passed + self.upstream
-
-
-def history_of(classes: SizeClasses, by_class: Array, per_row: Array) -> list[dict[str, int]]:
-    """The counts of each step, as the deck of an invasion writes them."""
-    counts = np.rint(by_class / classes.volume / per_row).astype(int).sum(axis=2)
-    names, step = ("invaded", "passed", "upstream"), np.arange(len(counts))
-    columns = {"chunk": step + 1, "step": step} | dict(zip(names, counts.T, strict=True))
-    return rows_of({name: columns[name].tolist() for name in HISTORY_COLUMNS})
-
-
+# ---- Fines as spheres, at the end.
 def spheres_at_the_end(
     case: InvasionCase, model: ClassModel, kept: ClassInvasion, counts: Counts
 ) -> Snapshot:
     """Fines at places in the pores and throats that hold them, and the cake before the face."""
-    rng, solids = np.random.default_rng(case.seed), kept.solids
-    network, sieve = model.network, model.sieve
-    pores, position, radius = len(sieve.void), [], []
-    for i, one in enumerate(counts.invaded):
-        held = solids.in_pores[:, i] + solids.attached[:, i] + solids.carried[:, i]
-        where = _dealt(np.concatenate([held, solids.in_throats[:, i]]), int(one))
+    rng, position, radius = np.random.default_rng(case.seed), [], []
+    low, high = model.network.box.T
+    thickness = thickness_of_cake(model.sieve, kept.solids)
+    for i, (inside, before) in enumerate(zip(counts.invaded, counts.upstream, strict=True)):
         own = 0.5 * model.classes.diameter[i]
-        inside = [
-            _places(network, where[where < pores], own, rng),
-            sieve.throat_place[where[where >= pores] - pores],
-        ]
-        position.append(_into_the_box(network, np.concatenate(inside)))
-        position.append(_before(model, int(counts.upstream[i]), solids, rng))
-        radius.append(np.full(int(one) + int(counts.upstream[i]), own))
+        position.append(_placed(model, _dealt(_held(kept.solids, i), inside), own, rng))
+        cake = low + rng.random((before, 3)) * (high - low)
+        cake[:, 0] = low[0] - (1e-6 + rng.random(before)) * thickness
+        position.append(cake)
+        radius.append(np.full(inside + before, own))
     place = np.concatenate(position)
-    fines = resting(place, np.concatenate(radius), network.box, Kind.FINE)
+    fines = resting(place, np.concatenate(radius), model.network.box, Kind.FINE)
     return replace(fines, id=fines.id + FIRST_DRAWN)
 
 
-def _into_the_box(network: Network, place: Array) -> Array:
-    """Places (N, 3) m in the box: what a cut pore holds lies on its inner side."""
-    low, high = network.box.T
-    size, away = high - low, place - low
-    away[:, 0] = size[0] - np.abs(size[0] - np.abs(away[:, 0]))
-    away[:, 0] = np.clip(away[:, 0], 0.0, size[0] * (1.0 - 1e-9))
-    away[:, 1:] %= size[1:]
-    return low + away
+def _held(solids: Deposits, i: int) -> Array:
+    """(N + T,) m3 of class i in pores and throats."""
+    pores = solids.in_pores[:, i] + solids.attached[:, i] + solids.carried[:, i]
+    return np.concatenate([pores, solids.in_throats[:, i]])
 
 
 def _dealt(held: Array, count: int) -> Array:
@@ -262,6 +249,18 @@ def _dealt(held: Array, count: int) -> Array:
         return np.zeros(0, int)
     edges = np.cumsum(held) / held.sum() * count
     return np.minimum(np.searchsorted(edges, np.arange(count) + 0.5), len(held) - 1)
+
+
+def _placed(model: ClassModel, where: Array, radius: float, rng: np.random.Generator) -> Array:
+    """Points (N, 3) m in the pores and throats `where` (N,), inside the box."""
+    pores, (low, high) = len(model.sieve.void), model.network.box.T
+    points = _places(model.network, where[where < pores], radius, rng)
+    away = np.concatenate([points, model.sieve.throat_place[where[where >= pores] - pores]]) - low
+    size = high - low  # what a cut pore holds lies on its inner side
+    away[:, 0] = size[0] - np.abs(size[0] - np.abs(away[:, 0]))
+    away[:, 0] = np.clip(away[:, 0], 0.0, size[0] * (1.0 - 1e-9))
+    away[:, 1:] %= size[1:]
+    return low + away
 
 
 def _places(network: Network, groups: Array, radius: float, rng: np.random.Generator) -> Array:
@@ -285,13 +284,74 @@ def _places(network: Network, groups: Array, radius: float, rng: np.random.Gener
     return place
 
 
-def _before(model: ClassModel, count: int, solids: Deposits, rng: np.random.Generator) -> Array:
-    low, high = model.network.box.T
-    place = low + rng.random((count, 3)) * (high - low)
-    place[:, 0] = low[0] - (1e-6 + rng.random(count)) * thickness_of_cake(model.sieve, solids)
-    return place
+# ---- The same on the way, from states that are kept while the invasion goes on.
+class Passing(NamedTuple):
+    """A state of an invasion, in single precision."""
+
+    held: Array  # (C, N + T) m3 in pores and throats; (0,) of the first and where it is too large
+    flux: Array  # (T,) size of the flux of each throat over that of the specimen
 
 
+@dataclass(slots=True, eq=False, kw_only=True)
+class OnTheWay:
+    """The first state of an invasion, the last, and some at even steps between them."""
+
+    every: int  # steps between two
+    states: dict[int, Passing] = field(default_factory=dict)  # by step
+
+    def watch(self, step: int, solids: Deposits, flow: Flow) -> None:
+        """Keep this state; those before it go unless their turn is due."""
+        classes = range(len(solids.cake) if step and self.every < NEVER else 0)
+        held = np.array([_held(solids, i) for i in classes], np.float32)
+        flux = np.abs(flow.throat_flux) / max(flow.inflow, 1e-300)
+        due = {one: state for one, state in self.states.items() if one % self.every == 0}
+        self.states = due | {step: Passing(held, flux.astype(np.float32))}
+        if len(self.states) > MOST_STATES:
+            self.every *= 2
+
+
+def states_on_the_way(
+    case: InvasionCase, model: ClassModel, end: ClassInvasion, counts: Counts, seen: OnTheWay
+) -> dict[str, Array]:
+    """F states as classes.npz keeps them: steps, fluxes (F, T), and which fines stand, in order.
+
+    Those are the spheres of the end and, behind them, others that were washed out: `state_more`
+    (E, 4) with places and radii, m. At each state as many stand as its row counts. A sphere stands
+    the sooner the more of its place's last deposit is there, and in the cake the nearer the face.
+    """
+    rng, steps = np.random.default_rng([case.seed, 1]), np.array(list(seen.states))
+    x = spheres_at_the_end(case, model, end, counts).position[:, 0]
+    stands, others, more, first = [], [], [], 0
+    for i, (inside, cake) in enumerate(zip(counts.invaded, counts.upstream, strict=True)):
+        last, number = _held(end.solids, i), counts.rows[steps, :, i]
+        held = np.zeros((len(steps), len(last)))
+        for state, (known, _) in zip(held, seen.states.values(), strict=True):
+            state[:] = known[i] if len(known) else 0.0
+        held[-1], where, most = last, _dealt(last, inside), number[:, 0].argmax()
+        rank, own = np.arange(inside) - np.searchsorted(where, where), np.bincount(where)[where]
+        come = held[:, where] / last[where] * own - rank
+        extra = _dealt(np.maximum(held[most] - last, 0.0), number[most, 0] - inside)
+        never = np.broadcast_to(-1.0 - np.arange(len(extra)) - inside, (len(steps), len(extra)))
+        stand = _first(np.concatenate([come, never], axis=1), number[:, 0])
+        before = np.broadcast_to(x[first + inside : first + inside + cake], (len(steps), cake))
+        stands += [stand[:, :inside], _first(before, number[:, 2])]
+        others.append(stand[:, inside:])
+        radius, first = 0.5 * model.classes.diameter[i], first + inside + cake
+        more.append(np.insert(_placed(model, extra, radius, rng), 3, radius, axis=1))
+    return {
+        "state_step": steps,
+        "state_flux": np.array([one.flux for one in seen.states.values()]),
+        "state_fines": np.concatenate(stands + others, axis=1),
+        "state_more": np.concatenate(more),
+    }
+
+
+def _first(values: Array, counts: Array) -> Array:
+    """Whether each of `values` (F, K) is one of the `counts` (F,) largest of its row."""
+    return np.argsort(np.argsort(-values, axis=1, kind="stable"), axis=1) < counts[:, None]
+
+
+# ---- What the classes hand up to a core or a well.
 class Rested(NamedTuple):
     """Fines of one kind: where so many m3 rest in a specimen."""
 
@@ -310,24 +370,23 @@ def rested_classes(run: FinishedRun, case: InvasionCase) -> list[Rested]:
     name = finer_file(run.manifest["invade"]["steps"]) if case.with_classes else STATE
     kept = read_classes(run.path / "invade" / name, {})
     solids = replace(kept.solids, carried=np.zeros_like(kept.solids.carried))
-    volumes = np.array([solids.inside_by_class, solids.passed, 0.0 * solids.cake])
-    counts = model.counted(volumes)
+    inside = solids.inside_by_class
+    counts = model.counted(np.array([[inside, solids.passed, 0.0 * solids.cake]]))
     x = spheres_at_the_end(case, model, replace(kept, solids=solids), counts).position[:, 0]
     places = np.concatenate([solids.in_pores + solids.attached, solids.in_throats])
-    number = volumes[0] ** 2 / np.maximum(np.sum(places**2, axis=0), 1e-300)
-    found, last = [], np.cumsum(counts.invaded)
-    for i, (own, rows) in enumerate(zip(model.classes.diameter, counts.invaded, strict=True)):
-        found.append(
-            Rested(
-                name=f"{1e6 * own:.3g} µm",
-                concentration=float(model.classes.concentration[i]),
-                depth=x[last[i] - rows : last[i]],
-                volume=np.full(rows, volumes[0, i] / max(rows, 1)),
-                passed=float(solids.passed[i]),
-                number=min(float(number[i]), float(rows)),
-            )
+    number = inside**2 / np.maximum(np.sum(places**2, axis=0), 1e-300)
+    depths = np.split(x, np.cumsum(counts.invaded)[:-1])
+    return [
+        Rested(
+            name=f"{1e6 * model.classes.diameter[i]:.3g} µm",
+            concentration=float(model.classes.concentration[i]),
+            depth=depth,
+            volume=np.full(len(depth), inside[i] / max(len(depth), 1)),
+            passed=float(solids.passed[i]),
+            number=min(float(number[i]), float(len(depth))),
         )
-    return found
+        for i, depth in enumerate(depths)
+    ]
 
 
 # ---- The analysis of the specimen: that of its grains, with what the classes left.
@@ -338,65 +397,50 @@ def analysed_classes(
 
     A permeability is that of `base` times what the classes leave of it in the network of grains.
     """
-    network, sieve, fines = model.network, model.sieve, spheres.fines()
+    network, sieve, solids = model.network, model.sieve, kept.solids
     raised = ratio(base.conductance_initial, base.conductance_damaged)
     before = sieve.halves * np.where(raised > 0, raised, 1.0)[:, None]
     halves = before / kept.kept
-    raised = halves.sum(axis=1)
-    factor = np.where(raised > 0, ratio(before.sum(axis=1), raised), 1.0)
+    whole = halves.sum(axis=1)
+    factor = np.where(whole > 0, ratio(before.sum(axis=1), whole), 1.0)
     conductance = frozen(base.conductance_damaged * factor)
     flow = solve_flow(network, conductance)
     left = flow.inflow / base.flow_damaged.inflow if flow.inflow else 0.0
     k = base.k_damaged * left
-    depth = fines.position[fines.position[:, 0] >= network.box[0, 0], 0] - network.box[0, 0]
-    low = np.array([one.x_lo for one in base.sections])
-    edges = np.append(low, base.sections[-1].x_hi)
-    inplace = inplace_permeability(network, flow, edges, halves)
-    first = inplace_permeability(network, base.flow_damaged, edges, before)
-    filled, bins = _filled_by_depth(model, kept.solids), base.profile.edges
+    depth = spheres.fines().position[:, 0] - network.box[0, 0]
+    depth = depth[depth >= 0]
+    edges = np.array([*(one.x_lo for one in base.sections), base.sections[-1].x_hi])
+    two, spans = ((base.flow_damaged, before), (flow, halves)), [*pairwise(edges.tolist())]
+    inplace = [inplace_permeability(network, one, edges, side) for one, side in two]
+    cut = [
+        np.array([slab_permeability(network, one, span)[0] for span in spans])
+        for one in (base.conductance_damaged, conductance)
+    ]
+    kept_cut, kept_inplace = np.minimum(ratio(cut[1], cut[0]), 1.0), ratio(inplace[1], inplace[0])
+    count, filled = np.histogram(depth, edges)[0], _filled(model, solids, edges)
+    sections = [
+        replace(
+            one,
+            porosity_damaged=one.porosity_damaged - float(filled[i]),
+            k_damaged=one.k_damaged * float(kept_cut[i]),
+            k_reduction=reduction(one.k_initial, one.k_damaged * float(kept_cut[i])),
+            k_damaged_inplace=one.k_damaged_inplace * float(kept_inplace[i]),
+            fines_count=int(count[i]),
+            fines_fraction=float(count[i] / max(len(depth), 1)),
+        )
+        for i, one in enumerate(base.sections)
+    ]
+    bins = base.profile.edges
     profile = replace(
         base.profile,
-        porosity_damaged=frozen(base.profile.porosity_damaged - _share(filled, bins, sieve)),
+        porosity_damaged=frozen(base.profile.porosity_damaged - _filled(model, solids, bins)),
         fines_fraction=frozen(np.histogram(depth, bins)[0] / max(len(depth), 1)),
     )
-    sections, count = [], np.histogram(depth, edges)[0]
-    for one, damaged, intact, number, taken in zip(
-        base.sections, inplace, first, count, _share(filled, edges, sieve), strict=True
-    ):
-        cut = [
-            slab_permeability(network, g, (one.x_lo, one.x_hi))[0]
-            for g in (base.conductance_damaged, conductance)
-        ]
-        after = one.k_damaged * min(cut[1] / cut[0] if cut[0] > 0 else 0.0, 1.0)
-        sections.append(
-            replace(
-                one,
-                porosity_damaged=one.porosity_damaged - float(taken),
-                k_damaged=after,
-                k_reduction=reduction(one.k_initial, after),
-                k_damaged_inplace=one.k_damaged_inplace * float(damaged / intact),
-                fines_count=int(number),
-                fines_fraction=float(number / max(len(depth), 1)),
-            )
-        )
-    thin = layer_edges(network.box, network.grain_radius / 2.0)
-    thin = thin if base.layers is None else base.layers.edges
-    three = ((base.flow_initial, sieve.halves), (base.flow_damaged, before), (flow, halves))
-    drops = [-np.diff(plane_pressures(network, one, thin, side)) for one, side in three]
-    values = [inplace_permeability(network, one, thin, side) for one, side in three]
-    layers = base.layers or Layers(
-        edges=frozen(thin),
-        k_initial=frozen(values[0]),
-        k_damaged=frozen(values[1]),
-        drop_initial=frozen(drops[0]),
-        drop_damaged=frozen(drops[1]),
-        fines_count=frozen(np.zeros(len(thin) - 1, int)),
-    )
-    taken = float(_share(filled, edges[[0, -1]], sieve)[0])
-    other, cake = base.k_damaged_other, thickness_of_cake(sieve, kept.solids)
+    other, cake = base.k_damaged_other, thickness_of_cake(sieve, solids)
+    now = State(network=network, conductance=conductance, flow=flow, k=k, halves=halves)
     return replace(
         base,
-        occupancy=_occupancy(model, kept, base.occupancy, spheres, factor),
+        occupancy=_occupancy(model, solids, base.occupancy, spheres.fines(), factor),
         damage_law_used=base.damage_law_used or SIZE_CLASSES,
         k_damaged_other=None if other is None else other * left,
         conductance_damaged=conductance,
@@ -404,83 +448,73 @@ def analysed_classes(
         flow_damaged=flow,
         k_damaged=k,
         k_reduction=reduction(base.k_initial, k),
-        porosity_damaged=base.porosity_damaged - taken,
+        porosity_damaged=base.porosity_damaged - float(_filled(model, solids, edges[[0, -1]])[0]),
         sections=tuple(sections),
         profile=profile,
-        layers=replace(
-            layers,
-            k_damaged=frozen(layers.k_damaged * ratio(values[2], values[1])),
-            drop_damaged=frozen(layers.drop_damaged * ratio(drops[2], drops[1])),
-            fines_count=frozen(np.histogram(depth, thin)[0]),
-        ),
+        layers=_layers(base, now, before, sieve, depth),
         invaded_count=len(depth),
-        invaded_volume=base.invaded_volume + float(kept.solids.inside_by_class.sum()),
+        invaded_volume=base.invaded_volume + float(solids.inside_by_class.sum()),
         invasion_depth=float(depth.max(initial=0.0)),
         invasion_depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
         cake_thickness=base.cake_thickness + cake,
     )
 
 
-def _filled_by_depth(model: ClassModel, solids: Deposits) -> tuple[Array, Array, Array]:
-    """Solids m3 with the depths, m, between which each lies: that of its pore or throat."""
-    sieve = model.sieve
+def _layers(base: "Analysis", now: State, before: Array, sieve: Sieve, depth: Array) -> Layers:
+    """The thin layers of `base`, less what the classes take; `before` (T, 2) are its halves."""
+    if base.layers is None:
+        clean = replace(now, flow=base.flow_initial, halves=sieve.halves)
+        return make_layers(clean, now, now.network.grain_radius / 2.0, depth)
+    thickness = float(np.diff(base.layers.edges[:2])[0])
+    own = make_layers(replace(now, flow=base.flow_damaged, halves=before), now, thickness, depth)
+    return replace(
+        base.layers,
+        k_damaged=frozen(base.layers.k_damaged * ratio(own.k_damaged, own.k_initial)),
+        drop_damaged=frozen(base.layers.drop_damaged * ratio(own.drop_damaged, own.drop_initial)),
+        fines_count=own.fines_count,
+    )
+
+
+def _filled(model: ClassModel, solids: Deposits, edges: Array) -> Array:
+    """Share (B,) of slabs between `edges` (B+1,) m that solids take, spread over their pores."""
+    sieve, start = model.sieve, float(model.network.box[0, 0])
     held = (solids.in_pores + solids.attached + solids.carried).sum(axis=1)
     volume = np.concatenate([held, solids.in_throats.sum(axis=1)])
     reach = 0.5 * np.cbrt(sieve.void)
-    thin = np.minimum(*(reach[sieve.ends[:, side]] for side in (0, 1)))
+    reach = np.concatenate([reach, reach[sieve.ends].min(axis=1)])
     middle = np.concatenate([sieve.place[:, 0], sieve.throat_place[:, 0]])
-    reach, start = np.concatenate([reach, thin]), float(model.network.box[0, 0])
-    low = np.clip(middle - reach, start, start + sieve.length)
-    high = np.clip(middle + reach, start, start + sieve.length)
-    return volume, low, np.maximum(high, low + 1e-9 * sieve.length)
-
-
-def _share(filled: tuple[Array, Array, Array], edges: Array, sieve: Sieve) -> Array:
-    """Share (B,) of slabs between `edges` (B+1,) m that the solids take."""
-    volume, low, high = filled
+    low, high = (np.clip(middle + one, start, start + sieve.length) for one in (-reach, reach))
+    high = np.maximum(high, low + 1e-9 * sieve.length)
     below = [float(np.sum(volume * np.clip((x - low) / (high - low), 0.0, 1.0))) for x in edges]
     return np.diff(below) / (sieve.area * np.diff(edges))
 
 
 def _occupancy(
-    model: ClassModel,
-    kept: ClassInvasion,
-    base: Occupancy | None,
-    spheres: Snapshot,
-    factor: Array,
+    model: ClassModel, solids: Deposits, base: Occupancy | None, fines: Snapshot, factor: Array
 ) -> Occupancy:
     """What the solids take of throats and pores; a throat with less than 1 % left is blocked."""
-    network, sieve, solids = model.network, model.sieve, kept.solids
+    network, own = model.network, model.classes
     if base is None:
-        none = spheres.fines().where(np.zeros(len(spheres.fines()), bool))
-        base = measure_occupancy(network, none)
-    held = (solids.in_pores + solids.attached).sum(axis=1)
-    surface = (solids.in_pores + solids.attached) @ (6.0 / model.classes.diameter)
-    share = (
-        network.pore_volume
-        * network.pore_share
-        / np.maximum(sieve.void, 1e-300)[network.pore_group]
-    )
-    whole = np.maximum(network.pore_share, 0.125)
-    in_throats = solids.in_throats.sum(axis=1)
-    number = solids.in_throats @ (1.0 / model.classes.volume)
-    sizes = solids.in_throats @ (0.5 * model.classes.diameter / model.classes.volume)
-    mean = ratio(sizes + base.throat_fine_radius * base.throat_fines, number + base.throat_fines)
+        base = measure_occupancy(network, fines.where(np.zeros(len(fines), bool)))
+    held, group = solids.in_pores + solids.attached, network.pore_group
+    share = network.pore_volume * network.pore_share / np.maximum(model.sieve.void, 1e-300)[group]
+    share /= np.maximum(network.pore_share, 0.125)
+    volume = held.sum(axis=1)[group] * share
+    in_throats, number = solids.in_throats.sum(axis=1), solids.in_throats @ (1.0 / own.volume)
+    radii = solids.in_throats @ (0.5 * own.diameter / own.volume)
+    radii += base.throat_fine_radius * base.throat_fines
     cylinder = np.pi * network.throat_radius**2 * network.throat_length
-    solid = held[network.pore_group] * share / whole
     return replace(
         base,
-        throat_solid_volume=frozen(base.throat_solid_volume + in_throats),
-        throat_porosity=frozen(base.throat_porosity - ratio(in_throats, cylinder)),
-        throat_fine_radius=frozen(mean),
-        throat_fines=frozen(base.throat_fines + np.ceil(number - 1e-9).astype(int)),
-        blocked=frozen(base.blocked | (factor < 0.01)),
-        pore_solid_volume=frozen(base.pore_solid_volume + solid),
-        pore_solid_surface=frozen(
-            base.pore_solid_surface + surface[network.pore_group] * share / whole
-        ),
-        pore_porosity=frozen(base.pore_porosity - ratio(solid, network.pore_tetra_volume)),
-        fines=spheres.fines(),
+        fines=fines,
+        throat_solid_volume=base.throat_solid_volume + in_throats,
+        throat_porosity=base.throat_porosity - ratio(in_throats, cylinder),
+        throat_fine_radius=ratio(radii, number + base.throat_fines),
+        throat_fines=base.throat_fines + np.ceil(number - 1e-9).astype(int),
+        blocked=base.blocked | (factor < 0.01),
+        pore_solid_volume=base.pore_solid_volume + volume,
+        pore_solid_surface=base.pore_solid_surface + (held @ (6.0 / own.diameter))[group] * share,
+        pore_porosity=base.pore_porosity - ratio(volume, network.pore_tetra_volume),
     )
 
 
@@ -490,32 +524,36 @@ def finished_classes(
 ) -> tuple[FinishedInvasion, ClassModel, ClassInvasion]:
     """The invasion in `folder`, with its model and what the classes left."""
     model, kept = class_model(case, scales, grains), read_classes(folder / STATE)
-    counts = model.counted(kept.by_class[-1])
-    fines = spheres_at_the_end(case, model, kept, counts)
-    last = Checkpoint(
-        chunk=len(kept.rows),
-        step=len(kept.rows) - 1,
-        upstream=int(counts.upstream.sum()),
-        invaded=int(counts.invaded.sum()),
-        passed=int(counts.passed.sum()),
-        removed_upstream=0,
-        most_crossed=0,
-        quiet=0,
-    )
-    numbers = history_of(model.classes, kept.by_class, counts.per_row)
+    counts, times = model.counted(kept.by_class), [row["time_s"] for row in kept.rows]
+    history = counts.history
+    end = replace(spheres_at_the_end(case, model, kept, counts), time_s=times[-1])
+    states = [(history[-1], end)]
+    with np.load(folder / STATE) as data:
+        if "state_step" in data.files:
+            more = resting(data["state_more"][:, :3], data["state_more"][:, 3], end.box, Kind.FINE)
+            all_fines = end.joined(replace(more, id=more.id + end.id.max(initial=FIRST_DRAWN)))
+            states = [
+                (history[step], replace(all_fines.where(stands), time_s=times[step]))
+                for step, stands in zip(data["state_step"], data["state_fines"], strict=True)
+            ][1:]
     rows = [
         {
             "time_s": row["time_s"],
             "physical_time_s": row["time_s"],
-            "supplied_count": own["invaded"] + own["passed"] + own["upstream"],
-            **{f"{name}_count": own[name] for name in ("invaded", "passed", "upstream")},
-            "step": own["step"],
+            "supplied_count": own.invaded + own.passed + own.upstream,
+            **{f"{name}_count": getattr(own, name) for name in ("invaded", "passed", "upstream")},
+            "step": own.step,
             **{name: row[name] for name in FLOW_COLUMNS if name in row},
         }
-        for row, own in zip(kept.rows, numbers, strict=True)
+        for row, own in zip(kept.rows, history, strict=True)
     ]
     done = FinishedInvasion(
-        case=case, scales=scales, history=(last,), damaged=grains.joined(fines), rows=tuple(rows)
+        case=case,
+        scales=scales,
+        history=(history[-1],),
+        damaged=grains.joined(end),
+        rows=tuple(rows),
+        states=tuple(states),
     )
     return done, model, kept
 
@@ -523,7 +561,7 @@ def finished_classes(
 def class_summary(case: InvasionCase, model: ClassModel, kept: ClassInvasion) -> dict[str, Any]:
     """The keys that the fast model adds to summary.json."""
     solids, last, own = kept.solids, kept.rows[-1], model.classes
-    counts = model.counted(kept.by_class[-1])
+    counts, thickness = model.counted(kept.by_class), thickness_of_cake(model.sieve, solids)
     given, drop, api = model.course.cake_permeability, last["pressure_cake_Pa"], None
     if given is not None:
         viscosity, share = case.fluid.viscosity_Pa_s, case.fines.volume_fraction
@@ -551,29 +589,20 @@ def class_summary(case: InvasionCase, model: ClassModel, kept: ClassInvasion) ->
     }
     if case.with_classes:
         return common | {"method": "both", "cake_of_classes_1_m": resistance}
-    return common | {
-        "cake_resistance_share": drop / max(drop + last["pressure_pack_Pa"], 1e-300),
-        "cake": _cake(model, kept, counts, resistance),
-    }
-
-
-def _cake(
-    model: ClassModel, kept: ClassInvasion, counts: Counts, resistance: float
-) -> dict[str, Any] | None:
-    """The cake as the summary of any run has it; None where no solids stand before the face."""
-    if not resistance:
-        return None
-    thickness = thickness_of_cake(model.sieve, kept.solids)
-    return {
+    cake = {
         "fines": int(counts.upstream.sum()),
         "thickness_m": thickness,
         "packed_thickness_m": thickness,
         "porosity": PACKED,
-        "k_m2": thickness / resistance,
-        "law": "given" if model.course.cake_permeability else "carman-kozeny",
+        "k_m2": thickness / resistance if resistance else None,
+        "law": "given" if given else "carman-kozeny",
         "resistance_1_m": resistance,
-        "resistance_pack_1_m": model.course.resistance / max(kept.rows[-1]["k_over_k0"], 1e-300),
+        "resistance_pack_1_m": model.course.resistance / max(last["k_over_k0"], 1e-300),
         "no_cake_yet": "",
+    }
+    return common | {
+        "cake_resistance_share": drop / max(drop + last["pressure_pack_Pa"], 1e-300),
+        "cake": cake if resistance else None,
     }
 
 

@@ -53,7 +53,7 @@ def both(run: FinishedRun) -> dict[str, Any]:
     model = class_model(case, invasion_scales(case), run.spheres("initial"))
     end = invade_classes(model.sieve, model.classes, model.course, model.flow)
     seconds = time.process_time() - start
-    counts = model.counted(end.by_class[-1])
+    counts = model.counted(end.by_class)
     x = spheres_at_the_end(case, model, end, counts).position[:, 0]
     edges = np.array([0.0, min(FIRST, case.size_m[0])])
     clean, flow = (model.flow(one, None).flow for one in (np.ones_like(end.kept), end.kept))
