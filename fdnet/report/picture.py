@@ -114,10 +114,10 @@ def drawing_command() -> list[str]:
 
 # ---- States of a run as a movie, one after the other (GIF or MP4), or below each other (PNG).
 SECONDS_PER_FRAME = 30.0  # Time that drawing one state may take
-WIDTH, PANEL_WIDTH = 880, 1200  # Pixels of a movie, and of pictures below each other, across
-TITLE = 44  # Pixels above each of the pictures below each other
+WIDTHS = (880, 1200)  # Pixels of a movie, and of pictures below each other, across
+TITLE = 44  # Pixels above each picture, for its words
 LAST_FRAMES = 6  # How long the last state stays, in frames
-COLOURS, GIF_COLOURS = 256, 128
+COLOURS = 256
 INK = (20, 20, 20)
 
 
@@ -144,9 +144,8 @@ def write_movie(
                 f"{target}: not drawn, because {reason}; install software OpenGL "
                 "(docs/start/install.md), or open invasion.pvd in ParaView"
             ) from error
-        above = write is _write_panels
-        pairs = zip(files, frames, strict=True)
-        pictures = [_worded(file, frame.words, above=above) for file, frame in pairs]
+        width, pairs = WIDTHS[write is _write_panels], zip(files, frames, strict=True)
+        pictures = [_worded(file, frame.words, width) for file, frame in pairs]
         with replacing(target) as part:
             write(part, pictures, per_second)
     return target
@@ -161,35 +160,32 @@ def refuse_suffix(target: Path) -> None:
         raise CaseError(f"{target}: MP4 needs the package imageio-ffmpeg; {advice}")
 
 
-def _worded(path: Path, words: str, *, above: bool) -> Any:
-    """A picture with words above it, or on it; then both sides are even, as MP4 wants them."""
+def _worded(path: Path, words: str, width: int) -> Any:
+    """A picture with words above it; both sides are even, as MP4 wants them."""
     from PIL import Image, ImageDraw, ImageFont
 
     with Image.open(path) as picture:
-        share = picture.height / picture.width
-        height = round(PANEL_WIDTH * share) if above else 2 * round(0.5 * WIDTH * share)
-        drawn = picture.convert("RGB").resize((PANEL_WIDTH if above else WIDTH, height))
-    if above:
-        whole = Image.new("RGB", (PANEL_WIDTH, height + TITLE), "white")
-        whole.paste(drawn, (0, TITLE))
-        drawn = whole
-    font = ImageFont.load_default(size=26 if above else 22)
-    ImageDraw.Draw(drawn).text((16, 12), words, fill=INK, font=font)
-    return drawn
+        height = 2 * round(0.5 * width * picture.height / picture.width)
+        whole = Image.new("RGB", (width, height + TITLE), "white")
+        whole.paste(picture.convert("RGB").resize((width, height)), (0, TITLE))
+    font = ImageFont.load_default(size=24)
+    ImageDraw.Draw(whole).text((16, 12), words, fill=INK, font=font)
+    return whole
 
 
 def _write_panels(path: Path, pictures: Sequence[Any], _: float) -> None:
     from PIL import Image
 
-    places = np.cumsum([0, *(picture.height for picture in pictures)]).tolist()
-    whole = Image.new("RGB", (PANEL_WIDTH, places[-1]), "white")
-    for picture, place in zip(pictures, places, strict=False):
-        whole.paste(picture, (0, place))
+    whole = Image.fromarray(np.concatenate([np.asarray(one) for one in pictures]))
     whole.quantize(COLOURS).save(path, "PNG", optimize=True)
 
 
 def _write_gif(path: Path, pictures: Sequence[Any], per_second: float) -> None:
-    colours = pictures[-1].quantize(GIF_COLOURS)
+    from PIL import Image
+
+    # of the first too: the last may hide the face behind a cake
+    both = np.concatenate([np.asarray(one) for one in (pictures[0], pictures[-1])])
+    colours = Image.fromarray(both).quantize(COLOURS)
     first, *more = (one.quantize(palette=colours, dither=0) for one in _lingering(pictures))
     every: Any = {"save_all": True, "append_images": more, "loop": 0}
     first.save(path, "GIF", duration=round(1000 / per_second), **every)

@@ -8,7 +8,6 @@ each, or one for several of them where there would be more than `MOST_ROWS`.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -36,10 +35,10 @@ from fdnet.files import replacing
 from fdnet.names import SIZE_CLASSES
 from fdnet.network.fines.occupancy import Occupancy, measure_occupancy, ratio
 from fdnet.network.flow.flow import Flow, solve_flow
-from fdnet.network.flow.sections import Layers, inplace_permeability, reduction, slab_permeability
+from fdnet.network.flow.sections import reduction
 from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.network import Network, build_network
-from fdnet.network.states import State, make_layers
+from fdnet.network.states import Log, State, all_conductances, make_layers, with_slabs
 from fdnet.report.tables import write_rows
 from fdnet.run.finished import FinishedRun
 from fdnet.run.fluid import FLOW_COLUMNS
@@ -56,9 +55,7 @@ STATE = "classes.npz"
 MOST_ROWS = 20_000  # Spheres that stand for the fines of a run
 FIRST_DRAWN = 10_000_000  # Numbers of these spheres begin here, behind those of LIGGGHTS
 TRIES = 8  # Places tried for each of them; the one farthest from the grains is taken
-MOST_STATES, MOST_NUMBERS, NEVER = 23, 20_000_000, 10**9
-"""States on the way from which an invasion is drawn, numbers that they may take while it goes on,
-and the steps between two where these are too many."""
+MOST_STATES = 23  # States from which an invasion is drawn, but for its end
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -78,7 +75,7 @@ class ClassModel:
         parcel = max(self.parcel, float(by_class[-1].sum()) / MOST_ROWS)
         per_row = np.maximum(np.ceil(parcel / own * (1.0 - 1e-9)), 1.0)
         rows = np.rint(by_class / own / per_row).astype(int)
-        return Counts(per_row, rows, *rows[-1])
+        return Counts(per_row, rows)
 
 
 class Counts(NamedTuple):
@@ -86,23 +83,12 @@ class Counts(NamedTuple):
 
     per_row: Array  # (C,) fines that a row stands for
     rows: Array  # (S, 3, C) inside the specimen, beyond and before it at each step
-    invaded: Array  # (C,) rows inside at the end
-    passed: Array  # (C,) that left through the outlet
-    upstream: Array  # (C,) before the face
-
-    @property
-    def supplied(self) -> Array:
-        """(C,) rows of all."""
-        return self.rows[-1].sum(axis=0)
 
     @property
     def history(self) -> list[Checkpoint]:
         """The counts of each step, as LIGGGHTS writes them."""
         totals = enumerate(self.rows.sum(axis=2).tolist())
-        return [
-            Checkpoint(step + 1, step, upstream, invaded, passed, 0, 0, 0)
-            for step, (invaded, passed, upstream) in totals
-        ]
+        return [Checkpoint(i + 1, i, up, inside, out, 0, 0, 0) for i, (inside, out, up) in totals]
 
 
 def class_model(
@@ -156,8 +142,7 @@ def class_model(
 # ---- The stage: what it writes, and its record.
 def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) -> dict[str, Any]:
     """Let the mud in, write what is left of it into `folder`, and return the stage's record."""
-    places, classes = len(model.sieve.void) + len(model.sieve.ends), len(model.classes.diameter)
-    seen = OnTheWay(every=1 if MOST_STATES * places * classes <= MOST_NUMBERS else NEVER)
+    seen = OnTheWay()
     end = invade_classes(model.sieve, model.classes, model.course, model.flow, watch=seen.watch)
     counts = model.counted(end.by_class)
     arrays = {one.name: getattr(end.solids, one.name) for one in fields(end.solids)}
@@ -168,22 +153,19 @@ def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) ->
     with replacing(folder / STATE) as part:
         np.savez_compressed(part, **arrays)
     write_rows(folder / HISTORY, [one._asdict() for one in counts.history])
-    left_out = ["the motion of single fines: size classes on the pore network instead"]
-    if seen.every == NEVER:
-        left_out.append("states on the way: the specimen is too large to keep them")
     return {
         "method": "network",
         "stop_reason": end.stop_reason,
         "max_overlap": 0.0,
         "steps": len(end.rows) - 1,
         "dt_s": 0.0,
-        "supplied": int(counts.supplied.sum()),
+        "supplied": int(counts.rows[-1].sum()),
         "mass_missing": float(np.abs(end.solids.missing).max()),
         "warnings": [explained(one) for one in all_is_cake(model)],
         "ranks": 1,
         "files": digests_of(folder, [HISTORY, STATE]),
         "runs": [],
-        "left_out": left_out,
+        "left_out": ["the motion of single fines: size classes on the pore network instead"],
     }
 
 
@@ -224,10 +206,10 @@ def spheres_at_the_end(
     """Fines at places in the pores and throats that hold them, and the cake before the face."""
     rng, position, radius = np.random.default_rng(case.seed), [], []
     low, high = model.network.box.T
-    thickness = thickness_of_cake(model.sieve, kept.solids)
-    for i, (inside, before) in enumerate(zip(counts.invaded, counts.upstream, strict=True)):
+    held, thickness = held_by(kept.solids), thickness_of_cake(model.sieve, kept.solids)
+    for i, (inside, before) in enumerate(counts.rows[-1, ::2].T):
         own = 0.5 * model.classes.diameter[i]
-        position.append(_placed(model, _dealt(_held(kept.solids, i), inside), own, rng))
+        position.append(_placed(model, _dealt(held[:, i], inside), own, rng))
         cake = low + rng.random((before, 3)) * (high - low)
         cake[:, 0] = low[0] - (1e-6 + rng.random(before)) * thickness
         position.append(cake)
@@ -237,10 +219,9 @@ def spheres_at_the_end(
     return replace(fines, id=fines.id + FIRST_DRAWN)
 
 
-def _held(solids: Deposits, i: int) -> Array:
-    """(N + T,) m3 of class i in pores and throats."""
-    pores = solids.in_pores[:, i] + solids.attached[:, i] + solids.carried[:, i]
-    return np.concatenate([pores, solids.in_throats[:, i]])
+def held_by(solids: Deposits) -> Array:
+    """(N + T, C) m3 of each class in pores and throats."""
+    return np.concatenate([solids.in_pores + solids.attached + solids.carried, solids.in_throats])
 
 
 def _dealt(held: Array, count: int) -> Array:
@@ -288,24 +269,23 @@ def _places(network: Network, groups: Array, radius: float, rng: np.random.Gener
 class Passing(NamedTuple):
     """A state of an invasion, in single precision."""
 
-    held: Array  # (C, N + T) m3 in pores and throats; (0,) of the first and where it is too large
+    held: Array  # (N + T,) m3 of solids in pores and throats
     flux: Array  # (T,) size of the flux of each throat over that of the specimen
 
 
-@dataclass(slots=True, eq=False, kw_only=True)
+@dataclass(slots=True, eq=False)
 class OnTheWay:
     """The first state of an invasion, the last, and some at even steps between them."""
 
-    every: int  # steps between two
     states: dict[int, Passing] = field(default_factory=dict)  # by step
+    every: int = 1  # steps between two
 
     def watch(self, step: int, solids: Deposits, flow: Flow) -> None:
         """Keep this state; those before it go unless their turn is due."""
-        classes = range(len(solids.cake) if step and self.every < NEVER else 0)
-        held = np.array([_held(solids, i) for i in classes], np.float32)
-        flux = np.abs(flow.throat_flux) / max(flow.inflow, 1e-300)
         due = {one: state for one, state in self.states.items() if one % self.every == 0}
-        self.states = due | {step: Passing(held, flux.astype(np.float32))}
+        flux = np.abs(flow.throat_flux) / max(flow.inflow, 1e-300)
+        now = (held_by(solids).sum(axis=1), flux)
+        self.states = due | {step: Passing(*(one.astype(np.float32) for one in now))}
         if len(self.states) > MOST_STATES:
             self.every *= 2
 
@@ -316,22 +296,20 @@ def states_on_the_way(
     """F states as classes.npz keeps them: steps, fluxes (F, T), and which fines stand, in order.
 
     Those are the spheres of the end and, behind them, others that were washed out: `state_more`
-    (E, 4) with places and radii, m. At each state as many stand as its row counts. A sphere stands
-    the sooner the more of its place's last deposit is there, and in the cake the nearer the face.
+    (E, 4) with places and radii, m. At each state as many of a class stand as its row counts: in a
+    place the sooner the more of its last solids are there, in the cake the nearer the face.
     """
     rng, steps = np.random.default_rng([case.seed, 1]), np.array(list(seen.states))
     x = spheres_at_the_end(case, model, end, counts).position[:, 0]
+    held, last = np.array([one.held for one in seen.states.values()]), held_by(end.solids)
     stands, others, more, first = [], [], [], 0
-    for i, (inside, cake) in enumerate(zip(counts.invaded, counts.upstream, strict=True)):
-        last, number = _held(end.solids, i), counts.rows[steps, :, i]
-        held = np.zeros((len(steps), len(last)))
-        for state, (known, _) in zip(held, seen.states.values(), strict=True):
-            state[:] = known[i] if len(known) else 0.0
-        held[-1], where, most = last, _dealt(last, inside), number[:, 0].argmax()
+    for i, (inside, cake) in enumerate(counts.rows[-1, ::2].T):
+        number, where = counts.rows[steps, :, i], _dealt(last[:, i], inside)
         rank, own = np.arange(inside) - np.searchsorted(where, where), np.bincount(where)[where]
-        come = held[:, where] / last[where] * own - rank
-        extra = _dealt(np.maximum(held[most] - last, 0.0), number[most, 0] - inside)
-        never = np.broadcast_to(-1.0 - np.arange(len(extra)) - inside, (len(steps), len(extra)))
+        most = number[:, 0].argmax()
+        extra = _dealt(held[most], number[most, 0] - inside)
+        come = held[:, where] / held[-1, where] * own - rank
+        never = np.broadcast_to(-1.0 - inside - np.arange(len(extra)), (len(steps), len(extra)))
         stand = _first(np.concatenate([come, never], axis=1), number[:, 0])
         before = np.broadcast_to(x[first + inside : first + inside + cake], (len(steps), cake))
         stands += [stand[:, :inside], _first(before, number[:, 2])]
@@ -373,9 +351,8 @@ def rested_classes(run: FinishedRun, case: InvasionCase) -> list[Rested]:
     inside = solids.inside_by_class
     counts = model.counted(np.array([[inside, solids.passed, 0.0 * solids.cake]]))
     x = spheres_at_the_end(case, model, replace(kept, solids=solids), counts).position[:, 0]
-    places = np.concatenate([solids.in_pores + solids.attached, solids.in_throats])
-    number = inside**2 / np.maximum(np.sum(places**2, axis=0), 1e-300)
-    depths = np.split(x, np.cumsum(counts.invaded)[:-1])
+    number = inside**2 / np.maximum(np.sum(held_by(solids) ** 2, axis=0), 1e-300)
+    depths = np.split(x, np.cumsum(counts.rows[-1, 0])[:-1])
     return [
         Rested(
             name=f"{1e6 * model.classes.diameter[i]:.3g} µm",
@@ -410,34 +387,53 @@ def analysed_classes(
     depth = spheres.fines().position[:, 0] - network.box[0, 0]
     depth = depth[depth >= 0]
     edges = np.array([*(one.x_lo for one in base.sections), base.sections[-1].x_hi])
-    two, spans = ((base.flow_damaged, before), (flow, halves)), [*pairwise(edges.tolist())]
-    inplace = [inplace_permeability(network, one, edges, side) for one, side in two]
-    cut = [
-        np.array([slab_permeability(network, one, span)[0] for span in spans])
-        for one in (base.conductance_damaged, conductance)
-    ]
-    kept_cut, kept_inplace = np.minimum(ratio(cut[1], cut[0]), 1.0), ratio(inplace[1], inplace[0])
+    was, now = (
+        with_slabs(
+            State(
+                network=network,
+                conductance=g,
+                flow=one,
+                k=one.inflow * sieve.length / sieve.area,
+                halves=sides,
+            ),
+            edges,
+            None,
+            all_conductances,
+            Log(),
+        )
+        for g, one, sides in (
+            (base.conductance_damaged, base.flow_damaged, before),
+            (conductance, flow, halves),
+        )
+    )
     count, filled = np.histogram(depth, edges)[0], _filled(model, solids, edges)
+    cut_out = np.minimum(ratio(now.slabs.cut_out, was.slabs.cut_out), 1.0)
+    inplace = ratio(now.slabs.inplace, was.slabs.inplace)
     sections = [
         replace(
             one,
             porosity_damaged=one.porosity_damaged - float(filled[i]),
-            k_damaged=one.k_damaged * float(kept_cut[i]),
-            k_reduction=reduction(one.k_initial, one.k_damaged * float(kept_cut[i])),
-            k_damaged_inplace=one.k_damaged_inplace * float(kept_inplace[i]),
+            k_damaged=one.k_damaged * float(cut_out[i]),
+            k_reduction=reduction(one.k_initial, one.k_damaged * float(cut_out[i])),
+            k_damaged_inplace=one.k_damaged_inplace * float(inplace[i]),
             fines_count=int(count[i]),
             fines_fraction=float(count[i] / max(len(depth), 1)),
         )
         for i, one in enumerate(base.sections)
     ]
-    bins = base.profile.edges
-    profile = replace(
-        base.profile,
-        porosity_damaged=frozen(base.profile.porosity_damaged - _filled(model, solids, bins)),
-        fines_fraction=frozen(np.histogram(depth, bins)[0] / max(len(depth), 1)),
-    )
-    other, cake = base.k_damaged_other, thickness_of_cake(sieve, solids)
-    now = State(network=network, conductance=conductance, flow=flow, k=k, halves=halves)
+    profile, layers = base.profile, base.layers
+    if layers is None:
+        clean = replace(now, flow=base.flow_initial, halves=sieve.halves)
+        layers = make_layers(clean, now, network.grain_radius / 2.0, depth)
+    else:
+        own = make_layers(was, now, float(np.diff(layers.edges[:2])[0]), depth)
+        layers = replace(
+            layers,
+            k_damaged=frozen(layers.k_damaged * ratio(own.k_damaged, own.k_initial)),
+            drop_damaged=frozen(layers.drop_damaged * ratio(own.drop_damaged, own.drop_initial)),
+            fines_count=own.fines_count,
+        )
+    other = base.k_damaged_other
     return replace(
         base,
         occupancy=_occupancy(model, solids, base.occupancy, spheres.fines(), factor),
@@ -450,36 +446,24 @@ def analysed_classes(
         k_reduction=reduction(base.k_initial, k),
         porosity_damaged=base.porosity_damaged - float(_filled(model, solids, edges[[0, -1]])[0]),
         sections=tuple(sections),
-        profile=profile,
-        layers=_layers(base, now, before, sieve, depth),
+        profile=replace(
+            profile,
+            porosity_damaged=profile.porosity_damaged - _filled(model, solids, profile.edges),
+            fines_fraction=np.histogram(depth, profile.edges)[0] / max(len(depth), 1),
+        ),
+        layers=layers,
         invaded_count=len(depth),
         invaded_volume=base.invaded_volume + float(solids.inside_by_class.sum()),
         invasion_depth=float(depth.max(initial=0.0)),
         invasion_depth_p95=float(np.quantile(depth, 0.95)) if len(depth) else 0.0,
-        cake_thickness=base.cake_thickness + cake,
-    )
-
-
-def _layers(base: "Analysis", now: State, before: Array, sieve: Sieve, depth: Array) -> Layers:
-    """The thin layers of `base`, less what the classes take; `before` (T, 2) are its halves."""
-    if base.layers is None:
-        clean = replace(now, flow=base.flow_initial, halves=sieve.halves)
-        return make_layers(clean, now, now.network.grain_radius / 2.0, depth)
-    thickness = float(np.diff(base.layers.edges[:2])[0])
-    own = make_layers(replace(now, flow=base.flow_damaged, halves=before), now, thickness, depth)
-    return replace(
-        base.layers,
-        k_damaged=frozen(base.layers.k_damaged * ratio(own.k_damaged, own.k_initial)),
-        drop_damaged=frozen(base.layers.drop_damaged * ratio(own.drop_damaged, own.drop_initial)),
-        fines_count=own.fines_count,
+        cake_thickness=base.cake_thickness + thickness_of_cake(sieve, solids),
     )
 
 
 def _filled(model: ClassModel, solids: Deposits, edges: Array) -> Array:
     """Share (B,) of slabs between `edges` (B+1,) m that solids take, spread over their pores."""
     sieve, start = model.sieve, float(model.network.box[0, 0])
-    held = (solids.in_pores + solids.attached + solids.carried).sum(axis=1)
-    volume = np.concatenate([held, solids.in_throats.sum(axis=1)])
+    volume = held_by(solids).sum(axis=1)
     reach = 0.5 * np.cbrt(sieve.void)
     reach = np.concatenate([reach, reach[sieve.ends].min(axis=1)])
     middle = np.concatenate([sieve.place[:, 0], sieve.throat_place[:, 0]])
@@ -590,7 +574,7 @@ def class_summary(case: InvasionCase, model: ClassModel, kept: ClassInvasion) ->
     if case.with_classes:
         return common | {"method": "both", "cake_of_classes_1_m": resistance}
     cake = {
-        "fines": int(counts.upstream.sum()),
+        "fines": int(counts.rows[-1, 2].sum()),
         "thickness_m": thickness,
         "packed_thickness_m": thickness,
         "porosity": PACKED,

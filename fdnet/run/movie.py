@@ -22,7 +22,7 @@ from fdnet.report.picture import MovieFrame, Scene, refuse_suffix, write_movie
 from fdnet.report.vtk import refuse_without_view, write_flux_vtp, write_spheres_vtp
 from fdnet.run.by_classes import STATE
 from fdnet.run.finished import FinishedRun, open_run
-from fdnet.run.folder import ANALYSE_AGAIN, check_finished, frames_in, frames_of
+from fdnet.run.folder import ANALYSE_AGAIN, check_finished, frames_of
 from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Array
 
@@ -33,57 +33,43 @@ BRIGHTEST, DECADES = 99.5, 2.0
 # ---- The states of a finished run.
 class DrawnState(NamedTuple):
     """One state of a run: the file of its spheres, None before the first fine came in, and its row
-    of the history."""
+    of the history, with `rate_over_initial` where the flow followed the deposit."""
 
     spheres: Path | None
     row: Mapping[str, Any]
-
-    @property
-    def rate(self) -> float | None:
-        """Over the first; None where the flow did not follow the deposit."""
-        if self.spheres is None:
-            return 1.0 if "rate_over_initial" in self.row else None
-        return self.row.get("rate_over_initial")
 
     def words(self, what: str, measured: float | None = None) -> str:
         """Time, rate, permeability (else the `measured` one) and number of `what` is drawn."""
         if self.spheres is None:
             return "clean sand"
         seconds = float(self.row.get("physical_time_s", self.row["time_s"]))
-        words = [f"{seconds:.3g} s" if seconds >= 1 else f"{1e3 * seconds:.3g} ms"]
-        if self.rate is not None:
-            words.append(f"rate {self.rate:.2f}")
-        k = self.row.get("k_over_k0", measured)
-        if k is not None:
-            words.append(f"k/k0 {k:.2f}")
-        return ",   ".join([*words, f"{int(self.row['invaded'])} {what}"])
+        time = f"{seconds:.3g} s" if seconds >= 1 else f"{1e3 * seconds:.3g} ms"
+        rate, k = self.row.get("rate_over_initial"), self.row.get("k_over_k0", measured)
+        shares = [
+            f"{name} {one:.2f}" for name, one in (("rate", rate), ("k/k0", k)) if one is not None
+        ]
+        return ",   ".join([time, *shares, f"{int(self.row['invaded'])} {what}"])
 
 
 def states_of(run: FinishedRun) -> Iterator[DrawnState]:
     """The states that the run kept, in order of time; the first is the clean specimen."""
     if not isinstance(run.case, InvasionCase):
         raise CaseError(f"{run.path}: has no fines, so there is no invasion to show")
-    kept = frames_of(run.manifest["files"])
-    files = frames_in(run.path) | kept
+    files = frames_of(run.manifest["files"])
     if not files:
         raise CaseError(
-            f"{run.path / 'frames'}: holds no states to draw; write them with fdnet run CASE.toml "
-            f"--out {shlex.quote(str(run.path))} --stages report --force"
+            f"{run.path / 'frames'}: holds no states that this run wrote; write them with fdnet "
+            f"run CASE.toml --out {shlex.quote(str(run.path))} --stages report --force"
         )
     rows: dict[int, Any] = {int(row["step"]): row for row in run.history.to_dict("records")}
-    for step, name in files.items():
-        if step not in rows or (kept and step not in kept):
-            raise CaseError(
-                f"{run.path / name}: is no state that this run wrote; move it out of this folder"
-            )
-    yield DrawnState(None, dict.fromkeys(map(str, run.history.columns), 0.0))
+    follows = "rate_over_initial" in run.history
+    yield DrawnState(None, {"step": 0} | ({"rate_over_initial": 1.0} if follows else {}))
     for step, name in sorted(files.items()):
         yield DrawnState(_there(run, name), rows[step])
 
 
 def _there(run: FinishedRun, name: str) -> Path:
-    path = run.path / name
-    if not path.is_file():
+    if not (path := run.path / name).is_file():
         raise CaseError(f"{path}: is missing; {ANALYSE_AGAIN}")
     return path
 
@@ -97,9 +83,9 @@ def drawn_as(run: FinishedRun) -> str:
 
 
 # ---- The flux of the throats at a state.
-FluxOf = Callable[[DrawnState], tuple[Array, float]]
-"""The flux (T,) of the throats in percent of the first flow, and k over that of the clean
-specimen. Where no rate is known it is the one at the first pressure drop."""
+FluxOf = Callable[[DrawnState], tuple[Array, float | None]]
+"""The flux (T,) of the throats in percent of the first flow, and k over that of the clean specimen
+where it is measured for it. Where no rate is known it is the one at the first pressure drop."""
 
 
 def flux_of(run: FinishedRun, network: Network) -> FluxOf:
@@ -111,17 +97,15 @@ def flux_of(run: FinishedRun, network: Network) -> FluxOf:
     if run.summary.get("method") == "network":
         with np.load(run.path / "invade" / STATE) as data:
             if "state_flux" not in data.files:
-                raise CaseError(
-                    f"{run.path}: kept no flow on its way; run the case anew for --show flux"
-                )
+                raise CaseError(f"{run.path}: kept no flow; run the case anew for --show flux")
             kept = dict(zip(data["state_step"].tolist(), data["state_flux"], strict=True))
-        return lambda one: (100.0 * one.rate * kept[int(one.row["step"])], one.row["k_over_k0"])
+        return lambda one: (100.0 * one.row["rate_over_initial"] * kept[one.row["step"]], None)
     choices = run.case.analysis
     clean = LAWS[choices.law](network)
     first = solve_flow(network, clean)
-    names = (str(run.summary.get(f"damage_law_{which}")) for which in ("other", "used"))
+    other = run.summary.get("damage_law_other") or run.summary["damage_law_used"]
     damaged = damage_law(
-        next((name for name in names if name in DAMAGE_LAWS), SECTION_ARCHIE),
+        other if other in DAMAGE_LAWS else SECTION_ARCHIE,
         clogging_threshold=choices.clogging_threshold,
         middle_band=choices.middle_band,
     )
@@ -132,10 +116,9 @@ def flux_of(run: FinishedRun, network: Network) -> FluxOf:
             fines = read_spheres(one.spheres, box=network.box).fines()
             occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
             flow = solve_flow(network, damaged(network, occupancy, clean).conductance)
-        k = flow.inflow / first.inflow if first.inflow > 0 else 0.0
-        flux = np.abs(flow.throat_flux)
-        share = flux / flow.inflow if flow.inflow > 0 else 0.0 * flux
-        return 100.0 * share * (k if one.rate is None else one.rate), k
+        k = flow.inflow / max(first.inflow, 1e-300)
+        share = np.abs(flow.throat_flux) / max(flow.inflow, 1e-300)
+        return 100.0 * share * one.row.get("rate_over_initial", k), k
 
     return flux
 

@@ -59,7 +59,7 @@ def both(run: FinishedRun) -> dict[str, Any]:
     clean, flow = (model.flow(one, None).flow for one in (np.ones_like(end.kept), end.kept))
     intact = inplace_permeability(model.network, clean, edges, model.sieve.halves)
     damaged = inplace_permeability(model.network, flow, edges, model.sieve.halves / end.kept)
-    passed, number = int(counts.passed.sum()), int(counts.invaded.sum())
+    passed, number = counts.history[-1].passed, counts.history[-1].invaded
     fast = (
         float(damaged[0] / intact[0]),
         end.rows[-1]["k_over_k0"],
