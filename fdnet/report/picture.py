@@ -38,13 +38,10 @@ class MovieFrame(NamedTuple):
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scene:
     """What all frames share: a file of spheres (.vtp) with the grains, for states may hold the
-    fines alone; the box (3, 2) m; title and limits of the colours of the flow, "" where no flow
-    is shown; and whether standard error says how many are drawn."""
+    fines alone; the box (3, 2) m; and whether standard error says how many are drawn."""
 
     grains: Path
     box: Array
-    title: str = ""
-    limits: tuple[float, float] = (0.0, 0.0)
     told: bool = False
 
 
@@ -79,8 +76,8 @@ def draw_frames(
         [str(path.absolute()) if path else "" for path in (one.spheres, one.lines, target)]
         for one, target in zip(frames, targets, strict=True)
     ]
-    work = {name: getattr(scene, name) for name in ("title", "limits", "told")} | {"frames": rows}
-    work |= {"grains": str(scene.grains.absolute()), "box": np.asarray(scene.box).tolist()}
+    work = {"grains": str(scene.grains.absolute()), "box": np.asarray(scene.box).tolist()}
+    work |= {"told": scene.told, "frames": rows}
     package = str(Path(__file__).resolve().parents[2])
     before = os.environ.get("PYTHONPATH")
     done = subprocess.run(
@@ -225,6 +222,9 @@ THINNEST_PIPE = 0.12  # Radius of the pipe of a flux below the colours, over tha
 FLOW_COLOURS = ["#E4F4CB", "#C7E9B4", "#7FCDBB", "#41B6C4", "#1D91C0", "#225EA8", "#253494"]
 FLOW_COLOURS += ["#081D58"]
 """From the lower to the upper limit (YlGnBu of ColorBrewer)."""
+FLUX = "flux of a throat,\n% of the first flow"  # Title of these colours
+BRIGHTEST, DECADES = 99.5, 2.0
+"""Percentile of the first state's values at which they end, and how many decades they show."""
 
 
 OBLIQUE, BROADSIDE = ((-1.1, -1.9, 0.9), (1500, 950)), ((-0.55, -1.9, 0.75), (1500, 760))
@@ -238,8 +238,10 @@ def draw_pictures(work: dict[str, Any]) -> None:
     """Draw each frame of what `draw_frames` sends; the colours are the same in all of them."""
     import pyvista as pv
 
-    bounds, still, flow = np.array(work["box"]) * MM, pv.read(work["grains"]), bool(work["title"])
+    bounds, still = np.array(work["box"]) * MM, pv.read(work["grains"])
+    flow = work["frames"][0][1]  # of the first state; "" where no flow is shown
     toward, window = BROADSIDE if flow else OBLIQUE
+    limits = colour_limits(pv.read(flow).cell_data["value"]) if flow else (0.0, 0.0)
     colours = {} if flow else colours_of(pv.read(work["frames"][-1][0]), bounds)
     for number, (spheres, lines, target) in enumerate(work["frames"], 1):
         state = pv.read(spheres)
@@ -251,7 +253,7 @@ def draw_pictures(work: dict[str, Any]) -> None:
             plotter.add_mesh(_balls(still, grains, 24), **glass)
             _add_fines(plotter, state, bounds, color=FINE_COLOUR, ambient=0.25)
             radius = float(still.point_data["radius_m"].mean()) * MM
-            _add_lines(plotter, pv.read(lines), radius, work["title"], work["limits"])
+            _add_lines(plotter, pv.read(lines), radius, limits)
         else:
             own = state.n_points and np.any(state.point_data["kind"] == Kind.GRAIN)
             packed = state if own else still
@@ -261,7 +263,7 @@ def draw_pictures(work: dict[str, Any]) -> None:
                 grey = {"color": GRAIN_COLOUR, "smooth_shading": True, "ambient": 0.15}
                 plotter.add_mesh(_balls(packed, far, 32), **grey)
             _add_fines(plotter, state, bounds, **colours)
-        _add_frame(plotter, bounds, depth_only=flow)
+        _add_frame(plotter, bounds, depth_only=bool(flow))
         _look(plotter, bounds, toward)
         plotter.screenshot(target)
         plotter.close()
@@ -318,15 +320,21 @@ def _add_fines(plotter: Any, spheres: Any, bounds: Array, **style: Any) -> None:
         plotter.add_mesh(drawn, smooth_shading=True, **style)
 
 
-def _add_lines(
-    plotter: Any, mesh: Any, radius: float, title: str, limits: Sequence[float]
-) -> None:
+def colour_limits(values: Array) -> tuple[float, float]:
+    """Two decades below the largest values (N,), rounded to one digit; of values above 0."""
+    most = float(np.percentile(values[values > 0], BRIGHTEST)) if np.any(values > 0) else 1.0
+    digit = 10.0 ** np.floor(np.log10(most))
+    high = float(np.ceil(most / digit) * digit)
+    return high / 10.0**DECADES, high
+
+
+def _add_lines(plotter: Any, mesh: Any, radius: float, limits: tuple[float, float]) -> None:
     """Throats as pipes among grains of a mean `radius`, as wide as their flux."""
     mesh.points = mesh.points * MM
     if not mesh.n_points:
         return
     scale = {"scalars": "value", "log_scale": True, "clim": limits, "cmap": FLOW_COLOURS}
-    look = {"ambient": 0.35, "smooth_shading": True, "scalar_bar_args": _bar(title, labels=3)}
+    look = {"ambient": 0.35, "smooth_shading": True, "scalar_bar_args": _bar(FLUX, labels=3)}
     plotter.add_mesh(_pipes(mesh, radius, limits[1]), **scale, **look)
 
 

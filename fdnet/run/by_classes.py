@@ -7,7 +7,8 @@ each, or one for several of them where there would be more than `MOST_ROWS`.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -142,8 +143,9 @@ def class_model(
 # ---- The stage: what it writes, and its record.
 def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) -> dict[str, Any]:
     """Let the mud in, write what is left of it into `folder`, and return the stage's record."""
-    seen = OnTheWay()
-    end = invade_classes(model.sieve, model.classes, model.course, model.flow, watch=seen.watch)
+    seen: dict[int, Passing] = {}
+    see, course = partial(watch, seen), model.course
+    end = invade_classes(model.sieve, model.classes, course, model.flow, watch=see)
     counts = model.counted(end.by_class)
     arrays = {one.name: getattr(end.solids, one.name) for one in fields(end.solids)}
     arrays |= {f"row_{key}": np.array([row[key] for row in end.rows]) for key in end.rows[0]}
@@ -160,7 +162,6 @@ def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) ->
         "steps": len(end.rows) - 1,
         "dt_s": 0.0,
         "supplied": int(counts.rows[-1].sum()),
-        "mass_missing": float(np.abs(end.solids.missing).max()),
         "warnings": [explained(one) for one in all_is_cake(model)],
         "ranks": 1,
         "files": digests_of(folder, [HISTORY, STATE]),
@@ -273,25 +274,21 @@ class Passing(NamedTuple):
     flux: Array  # (T,) size of the flux of each throat over that of the specimen
 
 
-@dataclass(slots=True, eq=False)
-class OnTheWay:
-    """The first state of an invasion, the last, and some at even steps between them."""
-
-    states: dict[int, Passing] = field(default_factory=dict)  # by step
-    every: int = 1  # steps between two
-
-    def watch(self, step: int, solids: Deposits, flow: Flow) -> None:
-        """Keep this state; those before it go unless their turn is due."""
-        due = {one: state for one, state in self.states.items() if one % self.every == 0}
-        flux = np.abs(flow.throat_flux) / max(flow.inflow, 1e-300)
-        now = (held_by(solids).sum(axis=1), flux)
-        self.states = due | {step: Passing(*(one.astype(np.float32) for one in now))}
-        if len(self.states) > MOST_STATES:
-            self.every *= 2
+def watch(seen: dict[int, Passing], step: int, solids: Deposits, flow: Flow) -> None:
+    """Keep the present state, and of those before it some at even steps, the first among them."""
+    every = 2 ** max(0, math.ceil(math.log2((step + 1) / MOST_STATES)))
+    for old in [one for one in seen if one % every]:
+        del seen[old]
+    held, flux = held_by(solids).sum(axis=1), np.abs(flow.throat_flux) / max(flow.inflow, 1e-300)
+    seen[step] = Passing(held.astype(np.float32), flux.astype(np.float32))
 
 
 def states_on_the_way(
-    case: InvasionCase, model: ClassModel, end: ClassInvasion, counts: Counts, seen: OnTheWay
+    case: InvasionCase,
+    model: ClassModel,
+    end: ClassInvasion,
+    counts: Counts,
+    seen: dict[int, Passing],
 ) -> dict[str, Array]:
     """F states as classes.npz keeps them: steps, fluxes (F, T), and which fines stand, in order.
 
@@ -299,9 +296,9 @@ def states_on_the_way(
     (E, 4) with places and radii, m. At each state as many of a class stand as its row counts: in a
     place the sooner the more of its last solids are there, in the cake the nearer the face.
     """
-    rng, steps = np.random.default_rng([case.seed, 1]), np.array(list(seen.states))
+    rng, steps = np.random.default_rng([case.seed, 1]), np.array(list(seen))
     x = spheres_at_the_end(case, model, end, counts).position[:, 0]
-    held, last = np.array([one.held for one in seen.states.values()]), held_by(end.solids)
+    held, last = np.array([one.held for one in seen.values()]), held_by(end.solids)
     stands, others, more, first = [], [], [], 0
     for i, (inside, cake) in enumerate(counts.rows[-1, ::2].T):
         number, where = counts.rows[steps, :, i], _dealt(last[:, i], inside)
@@ -309,16 +306,16 @@ def states_on_the_way(
         most = number[:, 0].argmax()
         extra = _dealt(held[most], number[most, 0] - inside)
         come = held[:, where] / held[-1, where] * own - rank
-        never = np.broadcast_to(-1.0 - inside - np.arange(len(extra)), (len(steps), len(extra)))
+        never = np.tile(-1.0 - inside - np.arange(len(extra)), (len(steps), 1))
         stand = _first(np.concatenate([come, never], axis=1), number[:, 0])
-        before = np.broadcast_to(x[first + inside : first + inside + cake], (len(steps), cake))
+        before = np.tile(x[first + inside : first + inside + cake], (len(steps), 1))
         stands += [stand[:, :inside], _first(before, number[:, 2])]
         others.append(stand[:, inside:])
         radius, first = 0.5 * model.classes.diameter[i], first + inside + cake
         more.append(np.insert(_placed(model, extra, radius, rng), 3, radius, axis=1))
     return {
         "state_step": steps,
-        "state_flux": np.array([one.flux for one in seen.states.values()]),
+        "state_flux": np.array([one.flux for one in seen.values()]),
         "state_fines": np.concatenate(stands + others, axis=1),
         "state_more": np.concatenate(more),
     }
@@ -387,25 +384,14 @@ def analysed_classes(
     depth = spheres.fines().position[:, 0] - network.box[0, 0]
     depth = depth[depth >= 0]
     edges = np.array([*(one.x_lo for one in base.sections), base.sections[-1].x_hi])
-    was, now = (
-        with_slabs(
-            State(
-                network=network,
-                conductance=g,
-                flow=one,
-                k=one.inflow * sieve.length / sieve.area,
-                halves=sides,
-            ),
-            edges,
-            None,
-            all_conductances,
-            Log(),
-        )
-        for g, one, sides in (
-            (base.conductance_damaged, base.flow_damaged, before),
-            (conductance, flow, halves),
-        )
-    )
+
+    def state(conductance: Array, flow: Flow, halves: Array) -> State:
+        k = flow.inflow * sieve.length / sieve.area
+        one = State(network=network, conductance=conductance, flow=flow, k=k, halves=halves)
+        return with_slabs(one, edges, None, all_conductances, Log())
+
+    was = state(base.conductance_damaged, base.flow_damaged, before)
+    now = state(conductance, flow, halves)
     count, filled = np.histogram(depth, edges)[0], _filled(model, solids, edges)
     cut_out = np.minimum(ratio(now.slabs.cut_out, was.slabs.cut_out), 1.0)
     inplace = ratio(now.slabs.inplace, was.slabs.inplace)
@@ -511,7 +497,7 @@ def finished_classes(
     counts, times = model.counted(kept.by_class), [row["time_s"] for row in kept.rows]
     history = counts.history
     end = replace(spheres_at_the_end(case, model, kept, counts), time_s=times[-1])
-    states = [(history[-1], end)]
+    states = []
     with np.load(folder / STATE) as data:
         if "state_step" in data.files:
             more = resting(data["state_more"][:, :3], data["state_more"][:, 3], end.box, Kind.FINE)
@@ -537,7 +523,7 @@ def finished_classes(
         history=(history[-1],),
         damaged=grains.joined(end),
         rows=tuple(rows),
-        states=tuple(states),
+        states=tuple(states or [(history[-1], end)]),
     )
     return done, model, kept
 

@@ -3,8 +3,8 @@
 import shlex
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import repeat
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,9 +25,6 @@ from fdnet.run.finished import FinishedRun, open_run
 from fdnet.run.folder import ANALYSE_AGAIN, check_finished, frames_of
 from fdnet.spheres.readers import read_spheres
 from fdnet.spheres.snapshot import Array
-
-BRIGHTEST, DECADES = 99.5, 2.0
-"""Percentile of the first values at which the colours end, and how many decades they show."""
 
 
 # ---- The states of a finished run.
@@ -82,58 +79,45 @@ def drawn_as(run: FinishedRun) -> str:
     return "spheres stand for the solids in the sand" if several else "fines in the sand"
 
 
-# ---- The flux of the throats at a state.
-FluxOf = Callable[[DrawnState], tuple[Array, float | None]]
-"""The flux (T,) of the throats in percent of the first flow, and k over that of the clean specimen
-where it is measured for it. Where no rate is known it is the one at the first pressure drop."""
+def fluxes_of(
+    run: FinishedRun, network: Network, states: Iterable[DrawnState]
+) -> Iterator[tuple[Array, float | None]]:
+    """The flux (T,) of the throats of a run in percent of the first flow at each of its `states`.
 
-
-def flux_of(run: FinishedRun, network: Network) -> FluxOf:
-    """How the flux of each throat in the network of a run follows from the fines.
-
-    The fast model kept it. Else the laws are those of the run; where it measured the damage in two
-    ways, that of the throats. Fines that still move count as deposit.
+    With it k over that of the clean specimen, where it is measured for it. The fast model kept the
+    flow. Else the laws are those of the run; where it measured the damage in two ways, that of the
+    throats. Fines that still move count as deposit. Where no rate is known it is the one at the
+    first pressure drop.
     """
     if run.summary.get("method") == "network":
         with np.load(run.path / "invade" / STATE) as data:
             if "state_flux" not in data.files:
                 raise CaseError(f"{run.path}: kept no flow; run the case anew for --show flux")
             kept = dict(zip(data["state_step"].tolist(), data["state_flux"], strict=True))
-        return lambda one: (100.0 * one.row["rate_over_initial"] * kept[one.row["step"]], None)
+        for one in states:
+            yield 100.0 * one.row["rate_over_initial"] * kept[one.row["step"]], None
+        return
     choices = run.case.analysis
     clean = LAWS[choices.law](network)
-    first = solve_flow(network, clean)
+    first = flow = solve_flow(network, clean)
     other = run.summary.get("damage_law_other") or run.summary["damage_law_used"]
     damaged = damage_law(
         other if other in DAMAGE_LAWS else SECTION_ARCHIE,
         clogging_threshold=choices.clogging_threshold,
         middle_band=choices.middle_band,
     )
-
-    def flux(one: DrawnState) -> tuple[Array, float]:
-        flow = first
+    for one in states:
         if one.spheres is not None:
             fines = read_spheres(one.spheres, box=network.box).fines()
             occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
             flow = solve_flow(network, damaged(network, occupancy, clean).conductance)
         k = flow.inflow / max(first.inflow, 1e-300)
         share = np.abs(flow.throat_flux) / max(flow.inflow, 1e-300)
-        return 100.0 * share * one.row.get("rate_over_initial", k), k
-
-    return flux
-
-
-def colour_limits(values: Array) -> tuple[float, float]:
-    """Two decades below the largest values (N,), rounded to one digit; of values above 0."""
-    most = float(np.percentile(values[values > 0], BRIGHTEST)) if np.any(values > 0) else 1.0
-    digit = 10.0 ** np.floor(np.log10(most))
-    high = float(np.ceil(most / digit) * digit)
-    return high / 10.0**DECADES, high
+        yield 100.0 * share * one.row.get("rate_over_initial", k), k
 
 
 # ---- The movie, or a picture of before and after.
 LEAST, MOST = 0.5, 30.0  # Frames a second that a movie may have
-TITLE = "flux of a throat,\n% of the first flow"  # Of the colours
 
 
 def movie_of(
@@ -169,21 +153,18 @@ def movie_of(
     scene = Scene(
         grains=_there(run, "spheres_initial.vtp"),
         box=np.array([(0.0, side) for side in run.case.size_m]),
-        title=TITLE if flux else "",
         told=progress,
     )
-    frames, network = [], run.network() if flux else None
-    fluxes = None if network is None else flux_of(run, network)
+    frames, network = list[MovieFrame](), run.network() if flux else None
+    fluxes = repeat((None, None)) if network is None else fluxes_of(run, network, states)
     with tempfile.TemporaryDirectory() as work:
         none = write_spheres_vtp(Path(work, "none.vtp"), run.spheres("initial").fines())
-        for number, one in enumerate(states, 1):
-            lines, k_over_k0 = None, None
-            if fluxes is not None:
+        for one, (values, k_over_k0) in zip(states, fluxes, strict=False):
+            lines = None
+            if values is not None:
+                lines = Path(work, f"lines_{len(frames):04d}.vtp")
+                write_flux_vtp(lines, network, values)
                 if progress:
-                    print(f"movie: flow of state {number} of {len(states)}", file=sys.stderr)
-                values, k_over_k0 = fluxes(one)
-                if number == 1:
-                    scene = replace(scene, limits=colour_limits(values))
-                lines = write_flux_vtp(Path(work, f"lines_{number:04d}.vtp"), network, values)
+                    print(f"movie: flow of {len(frames) + 1} of {len(states)}", file=sys.stderr)
             frames.append(MovieFrame(one.spheres or none, one.words(what, k_over_k0), lines))
         return write_movie(path, frames, scene, per_second=per_second)
