@@ -174,7 +174,7 @@ def _write_panels(path: Path, pictures: Sequence[Any], _: float) -> None:
     from PIL import Image
 
     whole = Image.fromarray(np.concatenate([np.asarray(one) for one in pictures]))
-    whole.quantize(COLOURS).save(path, "PNG", optimize=True)
+    whole.quantize(COLOURS, Image.Quantize.FASTOCTREE).save(path, "PNG", optimize=True)
 
 
 def _write_gif(path: Path, pictures: Sequence[Any], per_second: float) -> None:
@@ -182,7 +182,7 @@ def _write_gif(path: Path, pictures: Sequence[Any], per_second: float) -> None:
 
     # of the first too: the last may hide the face behind a cake
     both = np.concatenate([np.asarray(one) for one in (pictures[0], pictures[-1])])
-    colours = Image.fromarray(both).quantize(COLOURS)
+    colours = Image.fromarray(both).quantize(COLOURS, Image.Quantize.FASTOCTREE)
     first, *more = (one.quantize(palette=colours, dither=0) for one in _lingering(pictures))
     every: Any = {"save_all": True, "append_images": more, "loop": 0}
     first.save(path, "GIF", duration=round(1000 / per_second), **every)

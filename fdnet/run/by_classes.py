@@ -141,7 +141,7 @@ def class_model(
 
 
 # ---- The stage: what it writes, and its record.
-def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) -> dict[str, Any]:
+def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
     """Let the mud in, write what is left of it into `folder`, and return the stage's record."""
     seen: dict[int, Passing] = {}
     see, course = partial(watch, seen), model.course
@@ -150,7 +150,11 @@ def write_class_invasion(case: InvasionCase, model: ClassModel, folder: Path) ->
     arrays = {one.name: getattr(end.solids, one.name) for one in fields(end.solids)}
     arrays |= {f"row_{key}": np.array([row[key] for row in end.rows]) for key in end.rows[0]}
     arrays |= {"kept": end.kept, "by_class": end.by_class}
-    arrays |= states_on_the_way(case, model, end, counts, seen)
+    arrays |= {
+        "state_step": np.array([*seen]),
+        "state_held": np.array([one.held for one in seen.values()]),
+        "state_flux": np.array([one.flux for one in seen.values()]),
+    }
     folder.mkdir(parents=True, exist_ok=True)
     with replacing(folder / STATE) as part:
         np.savez_compressed(part, **arrays)
@@ -201,14 +205,13 @@ def rows_of(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
 
 
 # ---- Fines as spheres, at the end.
-def spheres_at_the_end(
-    case: InvasionCase, model: ClassModel, kept: ClassInvasion, counts: Counts
-) -> Snapshot:
+def spheres_at_the_end(case: InvasionCase, model: ClassModel, kept: ClassInvasion) -> Snapshot:
     """Fines at places in the pores and throats that hold them, and the cake before the face."""
     rng, position, radius = np.random.default_rng(case.seed), [], []
     low, high = model.network.box.T
     held, thickness = held_by(kept.solids), thickness_of_cake(model.sieve, kept.solids)
-    for i, (inside, before) in enumerate(counts.rows[-1, ::2].T):
+    counts = model.counted(kept.by_class).rows[-1]
+    for i, (inside, _, before) in enumerate(counts.T):
         own = 0.5 * model.classes.diameter[i]
         position.append(_placed(model, _dealt(held[:, i], inside), own, rng))
         cake = low + rng.random((before, 3)) * (high - low)
@@ -286,20 +289,23 @@ def watch(seen: dict[int, Passing], step: int, solids: Deposits, flow: Flow) -> 
 def states_on_the_way(
     case: InvasionCase,
     model: ClassModel,
-    end: ClassInvasion,
-    counts: Counts,
-    seen: dict[int, Passing],
-) -> dict[str, Array]:
-    """F states as classes.npz keeps them: steps, fluxes (F, T), and which fines stand, in order.
+    kept: ClassInvasion,
+    end: Snapshot,
+    seen: Mapping[int, Array],
+) -> Iterator[tuple[Checkpoint, Snapshot]]:
+    """The states (F) by their steps, from the spheres at the `end` and what places held, `seen`.
 
-    Those are the spheres of the end and, behind them, others that were washed out: `state_more`
-    (E, 4) with places and radii, m. At each state as many of a class stand as its row counts: in a
-    place the sooner the more of its last solids are there, in the cake the nearer the face.
+    At each as many of a class stand as its row counts: in a place the sooner the more of its last
+    solids are there, in the cake the nearer the face. Where more were inside than at the end, some
+    stand elsewhere.
     """
-    rng, steps = np.random.default_rng([case.seed, 1]), np.array(list(seen))
-    x = spheres_at_the_end(case, model, end, counts).position[:, 0]
-    held, last = np.array([one.held for one in seen.values()]), held_by(end.solids)
-    stands, others, more, first = [], [], [], 0
+    rng, steps, counts = (
+        np.random.default_rng([case.seed, 1]),
+        list(seen),
+        model.counted(kept.by_class),
+    )
+    held, last, x = np.array([*seen.values()]), held_by(kept.solids), end.position[:, 0]
+    stands, others, place, radius, first = [], [], [], [], 0
     for i, (inside, cake) in enumerate(counts.rows[-1, ::2].T):
         number, where = counts.rows[steps, :, i], _dealt(last[:, i], inside)
         rank, own = np.arange(inside) - np.searchsorted(where, where), np.bincount(where)[where]
@@ -311,14 +317,14 @@ def states_on_the_way(
         before = np.tile(x[first + inside : first + inside + cake], (len(steps), 1))
         stands += [stand[:, :inside], _first(before, number[:, 2])]
         others.append(stand[:, inside:])
-        radius, first = 0.5 * model.classes.diameter[i], first + inside + cake
-        more.append(np.insert(_placed(model, extra, radius, rng), 3, radius, axis=1))
-    return {
-        "state_step": steps,
-        "state_flux": np.array([one.flux for one in seen.values()]),
-        "state_fines": np.concatenate(stands + others, axis=1),
-        "state_more": np.concatenate(more),
-    }
+        first += inside + cake
+        radius.append(np.full(len(extra), 0.5 * model.classes.diameter[i]))
+        place.append(_placed(model, extra, 0.5 * model.classes.diameter[i], rng))
+    more = resting(np.concatenate(place), np.concatenate(radius), end.box, Kind.FINE)
+    fines = end.joined(replace(more, id=more.id + end.id.max(initial=FIRST_DRAWN)))
+    history = counts.history
+    for step, mask in zip(steps, np.concatenate(stands + others, axis=1), strict=True):
+        yield history[step], replace(fines.where(mask), time_s=kept.rows[step]["time_s"])
 
 
 def _first(values: Array, counts: Array) -> Array:
@@ -346,8 +352,9 @@ def rested_classes(run: FinishedRun, case: InvasionCase) -> list[Rested]:
     kept = read_classes(run.path / "invade" / name, {})
     solids = replace(kept.solids, carried=np.zeros_like(kept.solids.carried))
     inside = solids.inside_by_class
-    counts = model.counted(np.array([[inside, solids.passed, 0.0 * solids.cake]]))
-    x = spheres_at_the_end(case, model, replace(kept, solids=solids), counts).position[:, 0]
+    by_class = np.array([[inside, solids.passed, 0.0 * solids.cake]])
+    kept, counts = replace(kept, solids=solids, by_class=by_class), model.counted(by_class)
+    x = spheres_at_the_end(case, model, kept).position[:, 0]
     number = inside**2 / np.maximum(np.sum(held_by(solids) ** 2, axis=0), 1e-300)
     depths = np.split(x, np.cumsum(counts.rows[-1, 0])[:-1])
     return [
@@ -494,18 +501,13 @@ def finished_classes(
 ) -> tuple[FinishedInvasion, ClassModel, ClassInvasion]:
     """The invasion in `folder`, with its model and what the classes left."""
     model, kept = class_model(case, scales, grains), read_classes(folder / STATE)
-    counts, times = model.counted(kept.by_class), [row["time_s"] for row in kept.rows]
-    history = counts.history
-    end = replace(spheres_at_the_end(case, model, kept, counts), time_s=times[-1])
-    states = []
+    history, time = model.counted(kept.by_class).history, kept.rows[-1]["time_s"]
+    end = replace(spheres_at_the_end(case, model, kept), time_s=time)
+    states = [(history[-1], end)]
     with np.load(folder / STATE) as data:
         if "state_step" in data.files:
-            more = resting(data["state_more"][:, :3], data["state_more"][:, 3], end.box, Kind.FINE)
-            all_fines = end.joined(replace(more, id=more.id + end.id.max(initial=FIRST_DRAWN)))
-            states = [
-                (history[step], replace(all_fines.where(stands), time_s=times[step]))
-                for step, stands in zip(data["state_step"], data["state_fines"], strict=True)
-            ][1:]
+            seen = dict(zip(data["state_step"].tolist(), data["state_held"], strict=True))
+            states = [*states_on_the_way(case, model, kept, end, seen)][1:] or states
     rows = [
         {
             "time_s": row["time_s"],
@@ -523,7 +525,7 @@ def finished_classes(
         history=(history[-1],),
         damaged=grains.joined(end),
         rows=tuple(rows),
-        states=tuple(states or [(history[-1], end)]),
+        states=tuple(states),
     )
     return done, model, kept
 

@@ -48,7 +48,7 @@ def invade_stage(session: records.Session, case: InvasionCase) -> None:
     if case.by_classes:
         with session.timed("invade"):
             model = class_model(case, scales, grains)
-            record = write_class_invasion(case, model, folder)
+            record = write_class_invasion(model, folder)
         session.finish("invade", record)
         return
     progress = Progress("invade", _forecast(case, scales), show=session.options.show_progress)

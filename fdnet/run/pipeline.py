@@ -337,7 +337,7 @@ def with_finer(results: outputs.Results, supplied: int) -> outputs.Results:
     model = class_model(case, one.scales, grains, network=results.analysis.network)
     kept = read_classes(results.path / "invade" / finer_file(last.step), one.updates[-1])
     counts = model.counted(kept.by_class)
-    fines = spheres_at_the_end(case, model, kept, counts)
+    fines = spheres_at_the_end(case, model, kept)
     numbers = class_summary(case, model, kept) | {
         "supplied_count": supplied + int(counts.rows[-1].sum()),
         "passed_count": last.passed + counts.history[-1].passed,

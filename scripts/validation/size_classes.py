@@ -54,7 +54,7 @@ def both(run: FinishedRun) -> dict[str, Any]:
     end = invade_classes(model.sieve, model.classes, model.course, model.flow)
     seconds = time.process_time() - start
     counts = model.counted(end.by_class)
-    x = spheres_at_the_end(case, model, end, counts).position[:, 0]
+    x = spheres_at_the_end(case, model, end).position[:, 0]
     edges = np.array([0.0, min(FIRST, case.size_m[0])])
     clean, flow = (model.flow(one, None).flow for one in (np.ones_like(end.kept), end.kept))
     intact = inplace_permeability(model.network, clean, edges, model.sieve.halves)

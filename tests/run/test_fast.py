@@ -1,6 +1,7 @@
 """A run by the fast model: the same folder as with LIGGGHTS, from the same pack."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -145,14 +146,13 @@ def test_states_on_the_way_are_even_and_what_was_washed_out_is_drawn(fast):
         watch(seen, step, kept.solids, flow)
     assert list(seen) == [*range(0, 150, 8), 149]
     assert seen[149].flux.tolist() == [0.5, 1.5]
-    rows = np.repeat(model.counted(kept.by_class).rows[-1:], 150, axis=0)
-    rows[8, 0, 0] += 5
-    counts = model.counted(kept.by_class)._replace(rows=rows)
-    arrays = states_on_the_way(fast.case, model, kept, counts, seen)
-    stand = arrays["state_fines"].sum(axis=1) - rows[-1, ::2].sum()
-    assert stand.tolist() == [0, 5, *[0] * (len(seen) - 2)]
-    assert arrays["state_more"].shape == (5, 4)
-    x = arrays["state_more"][:, 0]
+    by_class = np.repeat(kept.by_class[-1:], 150, axis=0)
+    by_class[8, 0, 0] += 5 * model.classes.volume[0]
+    kept = replace(kept, by_class=by_class, rows=kept.rows[-1:] * 150)
+    end, held = fast.spheres().fines(), {step: one.held for step, one in seen.items()}
+    states = [one for _, one in states_on_the_way(fast.case, model, kept, end, held)]
+    assert [len(one) - len(end) for one in states] == [0, 5, *[0] * (len(seen) - 2)]
+    x = states[1].position[len(end) :, 0]
     assert ((x >= 0) & (x < fast.case.size_m[0])).all()
 
 
