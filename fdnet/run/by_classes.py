@@ -6,7 +6,7 @@ each, or one for several of them where there would be more than `MOST_ROWS`.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from pathlib import Path
@@ -75,8 +75,7 @@ class ClassModel:
         own = self.classes.volume
         parcel = max(self.parcel, float(by_class[-1].sum()) / MOST_ROWS)
         per_row = np.maximum(np.ceil(parcel / own * (1.0 - 1e-9)), 1.0)
-        rows = np.rint(by_class / own / per_row).astype(int)
-        return Counts(per_row, rows)
+        return Counts(per_row, np.rint(by_class / own / per_row).astype(int))
 
 
 class Counts(NamedTuple):
@@ -143,18 +142,15 @@ def class_model(
 # ---- The stage: what it writes, and its record.
 def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
     """Let the mud in, write what is left of it into `folder`, and return the stage's record."""
-    seen: dict[int, Passing] = {}
+    seen: dict[int, dict[str, Array]] = {}
     see, course = partial(watch, seen), model.course
     end = invade_classes(model.sieve, model.classes, course, model.flow, watch=see)
     counts = model.counted(end.by_class)
     arrays = {one.name: getattr(end.solids, one.name) for one in fields(end.solids)}
     arrays |= {f"row_{key}": np.array([row[key] for row in end.rows]) for key in end.rows[0]}
-    arrays |= {"kept": end.kept, "by_class": end.by_class}
-    arrays |= {
-        "state_step": np.array([*seen]),
-        "state_held": np.array([one.held for one in seen.values()]),
-        "state_flux": np.array([one.flux for one in seen.values()]),
-    }
+    arrays |= {"kept": end.kept, "by_class": end.by_class, "state_step": np.array([*seen])}
+    for name in ("held", "flux"):
+        arrays[f"state_{name}"] = np.array([one[name] for one in seen.values()])
     folder.mkdir(parents=True, exist_ok=True)
     with replacing(folder / STATE) as part:
         np.savez_compressed(part, **arrays)
@@ -192,16 +188,12 @@ def read_classes(path: Path, last: Mapping[str, float] | None = None) -> ClassIn
         solids = Deposits(**{one.name: data[one.name] for one in fields(Deposits)})
         if last is None:
             columns = {name[4:]: data[name].tolist() for name in data.files if name[:4] == "row_"}
-            rows, by_class = tuple(rows_of(columns)), data["by_class"]
+            table, by_class = zip(*columns.values(), strict=True), data["by_class"]
+            rows = tuple(dict(zip(columns, row, strict=True)) for row in table)
         else:
             rows = (dict(last),)
             by_class = np.array([[solids.inside_by_class, solids.passed, solids.cake]])
         return ClassInvasion(solids=solids, kept=data["kept"], by_class=by_class, rows=rows)
-
-
-def rows_of(columns: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    """The rows of a table that is given by its columns."""
-    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 # ---- Fines as spheres, at the end.
@@ -270,20 +262,17 @@ def _places(network: Network, groups: Array, radius: float, rng: np.random.Gener
 
 
 # ---- The same on the way, from states that are kept while the invasion goes on.
-class Passing(NamedTuple):
-    """A state of an invasion, in single precision."""
+def watch(seen: dict[int, dict[str, Array]], step: int, solids: Deposits, flow: Flow) -> None:
+    """Keep the present state, and of those before it some at even steps, the first among them.
 
-    held: Array  # (N + T,) m3 of solids in pores and throats
-    flux: Array  # (T,) size of the flux of each throat over that of the specimen
-
-
-def watch(seen: dict[int, Passing], step: int, solids: Deposits, flow: Flow) -> None:
-    """Keep the present state, and of those before it some at even steps, the first among them."""
+    That is `held` (N + T,) m3 of solids in pores and throats, and `flux` (T,), the size of the
+    flux of each throat over that of the specimen.
+    """
     every = 2 ** max(0, math.ceil(math.log2((step + 1) / MOST_STATES)))
     for old in [one for one in seen if one % every]:
         del seen[old]
     held, flux = held_by(solids).sum(axis=1), np.abs(flow.throat_flux) / max(flow.inflow, 1e-300)
-    seen[step] = Passing(held.astype(np.float32), flux.astype(np.float32))
+    seen[step] = {"held": held.astype(np.float32), "flux": flux.astype(np.float32)}
 
 
 def states_on_the_way(
@@ -538,22 +527,25 @@ def class_summary(case: InvasionCase, model: ClassModel, kept: ClassInvasion) ->
     if given is not None:
         viscosity, share = case.fluid.viscosity_Pa_s, case.fines.volume_fraction
         api = 1e6 * api_filtrate(given, viscosity=viscosity, solids=share, porosity=PACKED)
-    columns = {
-        "from_m": own.low,
-        "to_m": own.high,
-        "diameter_m": own.diameter,
-        "concentration": own.concentration,
-        "supplied_m3": solids.supplied,
-        "inside_m3": solids.inside_by_class,
-        "passed_m3": solids.passed,
-        "cake_m3": solids.cake,
-        "fines_per_row": counts.per_row.astype(int),
-    }
+    classes = [
+        {
+            "from_m": float(own.low[i]),
+            "to_m": float(own.high[i]),
+            "diameter_m": float(own.diameter[i]),
+            "concentration": float(own.concentration[i]),
+            "supplied_m3": float(solids.supplied[i]),
+            "inside_m3": float(solids.inside_by_class[i]),
+            "passed_m3": float(solids.passed[i]),
+            "cake_m3": float(solids.cake[i]),
+            "fines_per_row": int(per_row),
+        }
+        for i, per_row in enumerate(counts.per_row)
+    ]
     resistance = cake_resistance(given, model.sieve, solids, own)
     common = {
         "method": "network",
         "method_error": METHOD_ERROR,
-        "classes": rows_of({name: one.tolist() for name, one in columns.items()}),
+        "classes": classes,
         "mass_missing": float(np.abs(solids.missing).max()),
         "rate_over_initial": last["rate_over_initial"],
         "filtrate_m3": last["filtrate_m3"],

@@ -145,11 +145,11 @@ def test_states_on_the_way_are_even_and_what_was_washed_out_is_drawn(fast):
     for step in range(150):
         watch(seen, step, kept.solids, flow)
     assert list(seen) == [*range(0, 150, 8), 149]
-    assert seen[149].flux.tolist() == [0.5, 1.5]
+    assert seen[149]["flux"].tolist() == [0.5, 1.5]
     by_class = np.repeat(kept.by_class[-1:], 150, axis=0)
     by_class[8, 0, 0] += 5 * model.classes.volume[0]
     kept = replace(kept, by_class=by_class, rows=kept.rows[-1:] * 150)
-    end, held = fast.spheres().fines(), {step: one.held for step, one in seen.items()}
+    end, held = fast.spheres().fines(), {step: one["held"] for step, one in seen.items()}
     states = [one for _, one in states_on_the_way(fast.case, model, kept, end, held)]
     assert [len(one) - len(end) for one in states] == [0, 5, *[0] * (len(seen) - 2)]
     x = states[1].position[len(end) :, 0]
