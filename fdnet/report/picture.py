@@ -174,7 +174,7 @@ def _write_panels(path: Path, pictures: Sequence[Any], _: float) -> None:
     from PIL import Image
 
     whole = Image.fromarray(np.concatenate([np.asarray(one) for one in pictures]))
-    whole.quantize(COLOURS, Image.Quantize.FASTOCTREE).save(path, "PNG", optimize=True)
+    whole.quantize(COLOURS).save(path, "PNG", optimize=True)
 
 
 def _write_gif(path: Path, pictures: Sequence[Any], per_second: float) -> None:

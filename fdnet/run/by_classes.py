@@ -41,7 +41,7 @@ from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.network import Network, build_network
 from fdnet.network.states import Log, State, all_conductances, make_layers, with_slabs
 from fdnet.report.tables import write_rows
-from fdnet.run.finished import FinishedRun
+from fdnet.run.finished import HISTORY_COLUMNS, FinishedRun
 from fdnet.run.fluid import FLOW_COLUMNS
 from fdnet.run.folder import digests_of
 from fdnet.run.records import FinishedInvasion, finer_file
@@ -154,7 +154,8 @@ def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
     folder.mkdir(parents=True, exist_ok=True)
     with replacing(folder / STATE) as part:
         np.savez_compressed(part, **arrays)
-    write_rows(folder / HISTORY, [one._asdict() for one in counts.history])
+    rows = [dict(zip(HISTORY_COLUMNS, row, strict=False)) for row in counts.history]
+    write_rows(folder / HISTORY, rows)
     return {
         "method": "network",
         "stop_reason": end.stop_reason,
@@ -276,24 +277,18 @@ def watch(seen: dict[int, dict[str, Array]], step: int, solids: Deposits, flow: 
 
 
 def states_on_the_way(
-    case: InvasionCase,
-    model: ClassModel,
-    kept: ClassInvasion,
-    end: Snapshot,
-    seen: Mapping[int, Array],
+    case: InvasionCase, model: ClassModel, kept: ClassInvasion, seen: Mapping[int, Array]
 ) -> Iterator[tuple[Checkpoint, Snapshot]]:
-    """The states (F) by their steps, from the spheres at the `end` and what places held, `seen`.
+    """Fines at F steps, the end last, from the m3 (N + T,) that places held at each, `seen`.
 
-    At each as many of a class stand as its row counts: in a place the sooner the more of its last
-    solids are there, in the cake the nearer the face. Where more were inside than at the end, some
-    stand elsewhere.
+    As many of a class stand as the row counts: in a place the sooner the more of its last solids
+    are there, in the cake the nearer the face. Where more were inside than at the end, some stand
+    elsewhere.
     """
-    rng, steps, counts = (
-        np.random.default_rng([case.seed, 1]),
-        list(seen),
-        model.counted(kept.by_class),
-    )
-    held, last, x = np.array([*seen.values()]), held_by(kept.solids), end.position[:, 0]
+    steps, counts = [*seen], model.counted(kept.by_class)
+    end, last = spheres_at_the_end(case, model, kept), held_by(kept.solids)
+    held = np.array([*[*seen.values()][:-1], last.sum(axis=1)])
+    x, rng = end.position[:, 0], np.random.default_rng([case.seed, 1])
     stands, others, place, radius, first = [], [], [], [], 0
     for i, (inside, cake) in enumerate(counts.rows[-1, ::2].T):
         number, where = counts.rows[steps, :, i], _dealt(last[:, i], inside)
@@ -490,13 +485,11 @@ def finished_classes(
 ) -> tuple[FinishedInvasion, ClassModel, ClassInvasion]:
     """The invasion in `folder`, with its model and what the classes left."""
     model, kept = class_model(case, scales, grains), read_classes(folder / STATE)
-    history, time = model.counted(kept.by_class).history, kept.rows[-1]["time_s"]
-    end = replace(spheres_at_the_end(case, model, kept), time_s=time)
-    states = [(history[-1], end)]
+    history, seen = model.counted(kept.by_class).history, {len(kept.rows) - 1: np.zeros(1)}
     with np.load(folder / STATE) as data:
         if "state_step" in data.files:
             seen = dict(zip(data["state_step"].tolist(), data["state_held"], strict=True))
-            states = [*states_on_the_way(case, model, kept, end, seen)][1:] or states
+    states = tuple(states_on_the_way(case, model, kept, seen))
     rows = [
         {
             "time_s": row["time_s"],
@@ -512,9 +505,9 @@ def finished_classes(
         case=case,
         scales=scales,
         history=(history[-1],),
-        damaged=grains.joined(end),
+        damaged=grains.joined(states[-1][1]),
         rows=tuple(rows),
-        states=tuple(states),
+        states=states[1:] or states,
     )
     return done, model, kept
 

@@ -150,7 +150,7 @@ def test_states_on_the_way_are_even_and_what_was_washed_out_is_drawn(fast):
     by_class[8, 0, 0] += 5 * model.classes.volume[0]
     kept = replace(kept, by_class=by_class, rows=kept.rows[-1:] * 150)
     end, held = fast.spheres().fines(), {step: one["held"] for step, one in seen.items()}
-    states = [one for _, one in states_on_the_way(fast.case, model, kept, end, held)]
+    states = [one for _, one in states_on_the_way(fast.case, model, kept, held)]
     assert [len(one) - len(end) for one in states] == [0, 5, *[0] * (len(seen) - 2)]
     x = states[1].position[len(end) :, 0]
     assert ((x >= 0) & (x < fast.case.size_m[0])).all()
