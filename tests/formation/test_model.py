@@ -103,7 +103,7 @@ def test_the_pressure_of_a_core_rises_in_a_line_after_the_breakthrough():
 
 
 def test_the_face_closes_when_its_deposit_is_full():
-    """t* = deposit / (rate u c0) (Pang and Sharma 1997), and with a growing rate its logarithm."""
+    """t* = deposit / (rate u c0) (Wennberg and Sharma 1997); with a growing rate its logarithm."""
     made = flood(CORE, 50.0, closing=0.02, cake_permeability=1e-14)
     assert made.closed_at == pytest.approx(0.02 / (30.0 * 1e-7 / 2e-3 * 0.01), rel=1e-11)
     growing = mud((0.01, 30.0, 50.0))
@@ -166,7 +166,7 @@ def test_a_schedule_keeps_rate_and_pressure():
 
 
 def test_more_back_flow_returns_more_and_the_section_at_the_face_least():
-    """The trend of Egermann (SCA 2001-25)."""
+    """Egermann (SCA 2001-25) has it of the rate; the model knows the volume alone."""
     forth = Flood(seconds=6e4, rate=1e-7)
     returned = []
     for seconds in (0.0, 1e4, 3e4, 1e6):
