@@ -58,9 +58,10 @@ def _finish(name: str, options: argparse.Namespace) -> int:
     from fdnet.formation.scale_up import core_flood, keep, well_invasion, with_band
 
     model: Any = core_flood if name == "core" else well_invasion
-    known = signature(model).parameters
-    given = {key: value for key, value in vars(options).items() if key in known}
-    found = model(options.run, **{key: one for key, one in given.items() if one is not None})
+    asked = {key: value for key, value in vars(options).items() if value is not None}
+    known = {key: one.default for key, one in signature(model).parameters.items()}
+    given = {key: asked.get(key, default) for key, default in known.items() if key != "source"}
+    found = model(options.run, **given)
     keep(options.run, name, found, given)
     if options.json:
         print(json.dumps(found, indent=2))

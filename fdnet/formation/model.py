@@ -1,11 +1,7 @@
 """Fines carried into a core or around a well, in one dimension: filtration, Darcy, a cake.
 
-The volume V that has flowed in takes the place of time (Iwasaki 1937; Herzig, Leclerc and Le Goff
-1970): at a depth where the flow crosses the area A,
-
-    phi dc_i/dV + dc_i/dx / A = - ds_i/dV,    A ds_i/dV = rate_i (1 + growth_i s) c_i.
-
-Formulas, sources and cells are derived on docs/theory/from_core_to_well.md.
+The volume that has flowed in takes the place of time. Formulas, sources and cells are derived on
+docs/theory/from_core_to_well.md.
 """
 
 import math
@@ -149,7 +145,7 @@ def march(
     state, ends = Filled(cells, cells, cells, 0.0, 0.0), column.edges[[0, -1]]
     at = column.reach([*(ends if taps is None else taps), max(column.outer, ends[-1])])
     start, slope = medium.at_face(0.0)
-    quick = (abs(slope) + medium.damage * medium.power * start) / column.area
+    quick = (abs(slope) + medium.damage * medium.power * start) / column.area  # 1/m3, the face
     first = fineness / (quick + 10 / (medium.porosity * column.volume.sum()))
     parts, rows = _resistances(column, medium, at, state), list[tuple[Any, ...]]()
     rows.append((0.0, 0.0, drives[0].flow(mu * parts.sum()), parts, cells[:, 0]))

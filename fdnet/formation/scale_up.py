@@ -1,13 +1,7 @@
 """What a specimen hands up to the model, and what that says of a core and a well, with bands.
 
-Of fines that enter at constant concentration and come to rest, the deposit obeys
-
-    ds/dx = - rate (1 + growth s) s
-
-whatever the time at which each came (Herzig et al. 1970), so the depths of the fines give rate and
-growth. With g = ln(1 + growth s(0)) and w = (1 - exp(-g)) exp(-rate x), the share that gets deeper
-than x is ln(1 - w) / -g. The fit is that of the largest likelihood, each fine counting by its
-volume, those that passed by the share that gets through the length.
+The depths of the fines give rate and growth: the share that gets deeper than x is ln(1 - w) / -g,
+with g = ln(1 + growth s(0)) and w = (1 - exp(-g)) exp(-rate x) (docs/theory/from_core_to_well.md).
 """
 
 import math
@@ -49,8 +43,8 @@ def fit_depths(
 ) -> tuple[float, float, float]:
     """Rate (1/m), g, and volume (m3) of the fines that got into a specimen of `length` m.
 
-    The filtration is constant where they are too few. With `random` it is that of a sample in
-    which each of the fines comes as often as chance has it.
+    That of the largest likelihood, each fine by its volume, those that passed by the share that
+    gets through; constant where they are too few. With `random` each counts by chance.
     """
     depth, whole = np.append(fines.depth, length), float(fines.volume.sum())
     single = max(whole, 1e-300) / max(fines.number, 1.0)
@@ -110,7 +104,7 @@ def hand_up(
 
     Examples:
         >>> import fdnet
-        >>> fdnet.hand_up("runs/quick")[0].medium.rate[0] > 0
+        >>> fdnet.hand_up("runs/quick")[0].medium.closing > 0
         True
     """
     _above_zero(api_filtrate=api_filtrate)
@@ -397,7 +391,7 @@ def well_invasion(
         f"It matters where the flow has less room: perforations that met this mud ({SHOTS:g} a "
         f"metre, {1e3 * SHOT_LENGTH:g} mm long, {1e3 * SHOT_RADIUS:g} mm radius) have a skin of "
         f"{with_band(shot, 'skin')} and lose {with_band(shot, 'flow_lost')}.",
-        f"In {found['time_s'] / 3600:.3g} h {with_band(found, 'filtrate_m3')} m3 of filtrate "
+        f"In {found['time_s'] / 3600:.3g} h {with_band(found, 'filtrate_m3')} m3 of filtrate a metre "
         f"reach a radius of {with_band(found, 'invasion_radius_m')} m.",
     ]
     return found | {"words": words}
