@@ -164,7 +164,7 @@ def march(
                 met = _resistances(column, medium, at, after)
                 if np.isinf(met[0]):
                     break
-                seconds, tried = step / abs(drive.flow(mu * (parts + met).sum() / 2)), step
+                seconds = step / abs(drive.flow(mu * (parts + met).sum() / 2))
                 closer = (after.face - state.face) / max(medium.closing - state.face, TINY)
                 over = max(seconds / (end - time), closer)
                 step /= max(over, 1.0)
@@ -173,7 +173,7 @@ def march(
                 break
             left = end - time - seconds
             time = end if left < TINY * drive.seconds else time + seconds
-            filtrate, since, state, parts = filtrate + way * tried, since + tried, after, met
+            filtrate, since, state, parts = filtrate + way * step, since + step, after, met
             rows.append((time, filtrate, drive.flow(mu * parts.sum()), parts, effluent))
     times, volumes, rates, met, effluents = (np.array(one) for one in zip(*rows, strict=True))
     kept = np.diff(at)[:-1] / medium.permeability / met[:, 1:-1]

@@ -391,8 +391,8 @@ def well_invasion(
         f"It matters where the flow has less room: perforations that met this mud ({SHOTS:g} a "
         f"metre, {1e3 * SHOT_LENGTH:g} mm long, {1e3 * SHOT_RADIUS:g} mm radius) have a skin of "
         f"{with_band(shot, 'skin')} and lose {with_band(shot, 'flow_lost')}.",
-        f"In {found['time_s'] / 3600:.3g} h {with_band(found, 'filtrate_m3')} m3 of filtrate a metre "
-        f"reach a radius of {with_band(found, 'invasion_radius_m')} m.",
+        f"In {found['time_s'] / 3600:.3g} h {with_band(found, 'filtrate_m3')} m3 of filtrate a "
+        f"metre reach a radius of {with_band(found, 'invasion_radius_m')} m.",
     ]
     return found | {"words": words}
 

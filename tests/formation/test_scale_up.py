@@ -223,6 +223,7 @@ def test_the_commands_keep_numbers_figure_and_section(finished, tmp_path, capsys
     assert len(found["sections"]) == 4
     assert found["sections"][0]["k_over_k0"] < found["sections"][1]["k_over_k0"]
     assert "deposit of the run's end" in found["warnings"][-1]
+    assert found["depth_p95_m"] == pytest.approx(finished.invasion_depth_p95_m, rel=0.2)
     assert found["rate_m3_s"] == pytest.approx(1e-6 / 60, rel=1e-9)
     assert json.loads((run / "formation" / "core.json").read_text())["given"]["length"] == 0.076
     assert main(["well", str(run), "--hours", "2", "--pressure", "300psi", "--quiet"]) == 0
