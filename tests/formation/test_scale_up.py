@@ -13,15 +13,7 @@ from fdnet.cli import main
 from fdnet.errors import CaseError
 from fdnet.formation import scale_up
 from fdnet.formation.model import Column, Flood, march
-from fdnet.formation.scale_up import (
-    _merged,
-    core_flood,
-    fit_damage,
-    fit_depths,
-    hand_up,
-    kept_by,
-    well_invasion,
-)
+from fdnet.formation.scale_up import core_flood, fit_damage, fit_depths, hand_up, well_invasion
 from fdnet.run.by_classes import Rested
 from fdnet.run.finished import FinishedRun
 from fdnet.run.pipeline import run_case
@@ -113,8 +105,8 @@ def test_the_model_gives_a_specimen_its_own_profile_and_permeability_back(finish
     assert number[0].sum() == pytest.approx(measured.iloc[-1], rel=0.01)
     assert number[1:].sum(axis=1).std() / measured.iloc[-1] == pytest.approx(298**-0.5, rel=0.6)
     # each section within the scatter that a form with one number leaves
-    assert np.log(kept[0]) == pytest.approx(np.log(kept_by(finished)), abs=0.25)
-    assert kept[0][0] == pytest.approx(kept_by(finished)[0], abs=0.05)
+    assert np.log(kept[0]) == pytest.approx(np.log(scale_up.kept_by(finished)), abs=0.25)
+    assert kept[0][0] == pytest.approx(scale_up.kept_by(finished)[0], abs=0.05)
 
 
 def changed(run, spheres=lambda one: one, **summary):
@@ -252,7 +244,7 @@ def test_of_several_seeds_the_band_is_students():
         {"a": 1.0, "b": {"c": 2.0}, "d": [{"e": 1.0}]},
         {"a": 3.0, "b": {"c": 2.0}, "d": [{"e": 5.0}]},
     ]
-    found = _merged(rows, seeds=2)
+    found = scale_up._merged(rows, seeds=2)
     assert found["a"] == 2.0
     assert found["a_low"] == pytest.approx(2.0 - 12.706, rel=1e-4)
     assert found["b"] == {"c": 2.0}
