@@ -137,7 +137,7 @@ def _parser() -> Parser:
         prog="fdnet",
         description="What do the fines of a drilling mud cost the permeability of a sand?",
         epilog="example:\n  fdnet init --from quick && fdnet run quick.toml\n\n"
-        "fdnet COMMAND --help explains a command.",
+        "fdnet COMMAND --help explains a command. Pages named as docs/... are the project's.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.set_defaults(action=_say, parser=parser)

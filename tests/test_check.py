@@ -36,9 +36,25 @@ def test_what_is_odd_is_named_and_nothing_else():
         (("fines.count=100",), "fines.count"),
         (("run.cap_ms=2.0",), "run.cap_ms"),
         (("fines.radius_mm=0.12", "fines.count=400"), "fines.radius_mm"),
+        (("grains={radius_mm=0.4, porosity=0.38}",), "grains.porosity"),
     ]:
         assert key not in keys(*SOUND)
         assert key in keys(*SOUND, *odd)
+
+
+def test_one_trouble_is_said_once(root):
+    """Without [well], and with a pack that its grains overlap too much for, as it was made."""
+    case = tiny(*BULKY)
+    said = [
+        one.what for one in checked(case, scales_of(case)).findings if " of a well " in one.what
+    ]
+    assert len(said) == 1, said
+    for porosity, overlap, refused in (("25 %", "14 %", False), ("20 %", "21 %", True)):
+        given = [f"grains.porosity='{porosity}'"]
+        case = fdnet.read_case(root / "cases" / "quick.toml", assignments=given)
+        (text,) = [one.what for one in checked(case, scales_of(case)).findings]
+        assert f"overlap by up to some {overlap} of a diameter" in text
+        assert ("will be refused" in text) == refused
 
 
 def test_a_velocity_of_no_well_and_a_finest_tenth_that_takes_the_time_are_named():

@@ -94,7 +94,9 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
     if not tasks:
         return
     missing = sum(task.makes.endswith(MANIFEST) for task in tasks)
-    how.say(f"{len(plan.jobs)} runs, {missing} of them to do")
+    packs = len(tasks) - missing
+    shared = f", and {packs} packs that several of them share" if packs else ""
+    how.say(f"{len(plan.jobs)} runs, {missing} of them to do{shared}")
     for task in tasks:
         _log(path, task.name).unlink(missing_ok=True)
     numbers = itertools.count(1)

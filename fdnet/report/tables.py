@@ -44,7 +44,9 @@ def percent(share: float | None) -> str:
 
 def two_digits(share: float) -> str:
     """A share in percent with two digits and the sign of percent."""
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+    if 0.99 <= share < 1.0:
+        return f"{percent(share)} %"  # what is left may be what matters
+    return f"{100 * share:.2g} %" if share < 0.99 else f"{100 * share:.0f} %"
 
 
 def millimetres(length: float | None) -> str:
