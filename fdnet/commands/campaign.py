@@ -137,8 +137,6 @@ def add_campaign_commands(commands: Any) -> None:
 def _run_ensemble(options: argparse.Namespace) -> int:
     from fdnet.campaign.plan import ensemble_plan
 
-    if options.fast:
-        options.set = [*options.set, 'invasion.method="network"']
     plan = ensemble_plan(case_of(options), options.seeds, **_plan_options(options))
     return _run_campaign(options, plan)
 

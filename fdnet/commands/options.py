@@ -84,9 +84,10 @@ def meant(word: str, known: Iterable[str]) -> str:
 
 
 def overrides_of(options: argparse.Namespace) -> list[str]:
-    """The assignments of --set, then that of --seed."""
+    """The assignments of --set, then those of --seed and --fast."""
     seed = [] if options.seed is None else [f"seed={options.seed}"]
-    return [*options.set, *seed]
+    fast = ['invasion.method="network"'] if getattr(options, "fast", False) else []
+    return [*options.set, *seed, *fast]
 
 
 def case_of(options: argparse.Namespace) -> Any:
