@@ -56,8 +56,7 @@ def explanation(name: str) -> str:
 
 
 def test_a_case_shows_its_keys_and_what_was_given():
-    signature = str(inspect.signature(fdnet.Case))
-    assert signature.startswith("(*, name, seed=1, box, grains, fluid=Fluid(), well=None, drag=")
+    assert "(*, name, seed=1, box, grains, fluid=Fluid()" in str(inspect.signature(fdnet.Case))
     given = repr(tiny("fluid={viscosity_cP=7.0}"))
     assert "fluid=Fluid(viscosity_cP=7.0)" in given
     assert "gravity" not in given
