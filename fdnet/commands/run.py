@@ -32,8 +32,7 @@ def add_case_commands(commands: Any) -> None:
     run.add(OUTPUT, "--resume", "continue an unfinished run")
     run.share("--force", "--stages", "--json", "--quiet")
     run.share("--fast")
-    dry = "run and write nothing; print velocities, time steps and what is odd (fdnet render CASE "
-    dry += "--out DIR writes the LIGGGHTS decks too)"
+    dry = "write nothing; print velocities, time steps and what is odd (fdnet render: decks too)"
     run.add(OUTPUT, "--dry-run", dry)
 
     about = "say what is odd about a case, what to do about it, and what the run takes"

@@ -157,12 +157,12 @@ def size_warnings(case: Case) -> Iterator[Doubt]:
         rigid = 1 - close_packing(case.grains.curve)
         if porosity < rigid:
             most = WORST_OVERLAP * (1 - ((1 - rigid) / (1 - porosity)) ** (1 / 3))
-            limit = f"grains.max_overlap is {case.grains.max_overlap:g}"
             refused = ": the pack will be refused" if most > case.grains.max_overlap else ""
             yield Doubt(
                 "denser-than-spheres",
                 f"grains.porosity: {reach_text(rigid)}; at {porosity:g} grains overlap by up to "
-                f"some {100 * most:.0f} % of a diameter ({limit}{refused})",
+                f"some {100 * most:.0f} % of a diameter (grains.max_overlap is "
+                f"{case.grains.max_overlap:g}{refused})",
             )
 
 

@@ -234,8 +234,7 @@ def test_the_answer_is_a_sentence_to_act_on():
     cut_off = {"final": False, "stop_reason": "mud_cut_off"}
     for changed, said, not_said in [
         ({}, [*first, "than 2.4 mm"], "skin"),
-        ({"sections": [{"x_hi_m": 2.3e-3}]}, ["too short", "lengthen the box"], "deeper"),
-        (SHORT, ["too short", "the skin is 0.056 or more"], "small"),
+        (SHORT, ["too short", "lengthen the box", "the skin is 0.056 or more"], "deeper"),
         (SHORT | UNFINISHED, ["Provisional, at 34.0 %", "too short", "or more"], "Continue"),
         (UNFINISHED, ["so far 95 %", "Continue the run"], "too short"),
         (WELL, ["small skin of 0.056", "0.81 % of the flow", "108 mm"], "infinite"),
