@@ -257,8 +257,8 @@ def _assumptions(
 def _row(result: "Analysis") -> dict[str, Any]:
     from fdnet.report.tables import section_rows
 
-    same = ("k_reduction", "porosity_initial", "porosity_damaged", "solver", "law", "damage_law")
-    same += ("damage_law_used", "damage_law_other")
+    laws = ("law", "damage_law", "damage_law_used", "damage_law_other")
+    same = ("k_reduction", "porosity_initial", "porosity_damaged", "solver", *laws)
     return {name: getattr(result, name) for name in same} | {
         "k_initial_m2": result.k_initial,
         "k_damaged_m2": result.k_damaged,
