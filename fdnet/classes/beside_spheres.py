@@ -21,12 +21,14 @@ import numpy as np
 from fdnet.case.case import InvasionCase
 from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient, mud_classes
 from fdnet.classes.deposit import (
+    NONE,
     Deposits,
     Release,
     Sieve,
     advanced,
     holding,
     kept_shares,
+    loads_of,
     no_solids,
     released,
     sieve_of,
@@ -90,6 +92,7 @@ class FinerClasses:
     kept: Array  # (T, 2) share that the classes leave of what the spheres leave
     flux: Array  # (T,) m3, of the last solve
     pressure: Array  # (N,) of the last solve
+    full: Array  # (N,) whether spheres and classes fill the pore, by the last update
     solved: float = 0.0  # m3 of them that the last solve knew
 
     def among(self, passed: Passed, spheres: Stands) -> Narrowed:
@@ -125,7 +128,10 @@ class FinerClasses:
         self.kept = np.minimum(left[0] / left[1], 1.0)
         held, rest = self._held, self.solids.in_pores + self.solids.attached
         grown = held - self.solved > CHANGED * held
-        return Narrowed(spheres.factor * self.kept, rest.sum(axis=1), grown)
+        volume = rest.sum(axis=1)
+        loads = loads_of(self.sieve, self._among(self.solids, spheres), self.classes)
+        self.full = (loads.filled >= 1.0) & (volume > NONE * self.sieve.void)
+        return Narrowed(spheres.factor * self.kept, volume, grown)
 
     def _among(self, solids: Deposits, spheres: Stands) -> Deposits:
         """The solids with the standing spheres as the last class."""
@@ -234,6 +240,7 @@ def finer_classes(
         kept=np.ones(sieve.ends.shape),
         flux=np.zeros(0),
         pressure=np.zeros(0),
+        full=np.zeros(len(sieve.void), bool),
     )
     made.solve(flow)
     return made

@@ -29,6 +29,7 @@ from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
 from fdnet.network.fines.crowding import Neighbourhood, local_porosity
+from fdnet.network.fines.occupancy import ratio
 from fdnet.run import network_flow
 from fdnet.run.cake import Standing, standing_cake
 from fdnet.scales.drag import crowd_drag_factor
@@ -188,6 +189,8 @@ def history_rows(
 STANDING = 0.5
 """A fine belongs to the deposit when it is slower than this share of the velocity given to it."""
 
+BEDDED = 1e3  # Drag on a sphere among finer solids that fill its pore with it, over that of a fluid
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NetworkFluid:
@@ -312,6 +315,10 @@ class NetworkFluid:
         on_fines = float(drag[within].sum()) + float(pressed[outside, 0].sum())
         on_grains, on_held = drop * float(carried.pressed.grains[0]), float(pressed[held, 0].sum())
         whole, law = (drop + loose) * pack.network.area, float(crowd[held] @ fluid[held, 0])
+        if finer is not None:
+            bedded = self._bedded(fines, intact, finer.full)
+            coefficient[bedded] *= BEDDED
+            velocity[bedded], push[bedded] = 0.0, 0.0
         # rates and pressures are those of the fluid itself, which is slower than a driven one
         driven = scales.force_factor
         return FluidForces(
@@ -357,6 +364,20 @@ class NetworkFluid:
         velocity = self._before(moment) / self.scales.force_factor
         cake = float(4.0 / 3.0 * np.pi * np.sum(stack.fines.radius**3))
         return self.finer.among(Passed(before, filtrate, velocity), Stands(kept, in_pores, cake))
+
+    def _bedded(self, fines: Snapshot, intact: Array, full: Array) -> Array:
+        """Which of the `fines` lie in, or reach along the `intact` flow (N, 3) into, full pores.
+
+        `full` (G,) says which groups of pores are.
+        """
+        pack = self.pack
+        way = ratio(intact, _speed(intact)[:, None])
+        way[fines.position[:, 0] < 0.0] = [1.0, 0.0, 0.0]
+        found = np.zeros(len(fines), bool)
+        for place in (fines.position, fines.position + way * fines.radius[:, None]):
+            within = (place[:, 0] >= 0.0) & (place[:, 0] < pack.length)
+            found[within] |= full[pack.network.pore_group[pack.pore_of(place[within])]]
+        return found
 
     def _before(self, moment: Moment) -> float:
         """Superficial velocity up to this moment, m/s."""
