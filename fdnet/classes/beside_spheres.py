@@ -9,7 +9,8 @@ the spheres leave of it,
 
 with the resistance r of the side by the fast model. A throat to which the spheres leave the share
 s of its conductance lets pass what is narrower than s^(1/4) of its passage, since the conductance
-of an opening goes with the fourth power of its width. Spheres move through what the classes left.
+of an opening goes with the fourth power of its width. Spheres and classes share the room of a
+pore: where both together fill it, by the fast model, spheres stay in it, and before it.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -83,6 +84,7 @@ class FinerClasses:
     network: Network  # of the grains, with pores in N groups and throats (T)
     sieve: Sieve  # the same as solids meet it
     classes: SizeClasses  # (C) and, as the last one, the spheres
+    own: SizeClasses  # (C) without them
     bed: Bed  # grains and fluid, for what sticks to them
     sticking: float  # share of the contacts with grains that stick
     release: Release | None  # what the flow lifts; None: nothing
@@ -119,19 +121,15 @@ class FinerClasses:
             self.solids = Deposits(
                 **{one.name: getattr(after, one.name)[..., :-1] for one in fields(Deposits)}
             )
-        alone = replace(self.solids, **{name: 0.0 * getattr(self.solids, name) for name in HELD})
-        left = [
-            kept_shares(self.sieve, self._among(one, spheres), self.classes)
-            for one in (self.solids, alone)
-        ]
+        nothing = no_solids(self.sieve, self.own)
+        both, alone = (self._among(one, spheres) for one in (self.solids, nothing))
+        left, without = (kept_shares(self.sieve, one, self.classes) for one in (both, alone))
         # loosely packed spheres among fine solids may seem to make room: they make none
-        self.kept = np.minimum(left[0] / left[1], 1.0)
-        held, rest = self._held, self.solids.in_pores + self.solids.attached
-        grown = held - self.solved > CHANGED * held
-        volume = rest.sum(axis=1)
-        loads = loads_of(self.sieve, self._among(self.solids, spheres), self.classes)
-        self.full = (loads.filled >= 1.0) & (volume > NONE * self.sieve.void)
-        return Narrowed(spheres.factor * self.kept, volume, grown)
+        self.kept = np.minimum(left / without, 1.0)
+        held, rest = self._held, (self.solids.in_pores + self.solids.attached).sum(axis=1)
+        filled = loads_of(self.sieve, both, self.classes).filled
+        self.full = (filled >= 1.0) & (rest > NONE * self.sieve.void)
+        return Narrowed(spheres.factor * self.kept, rest, held - self.solved > CHANGED * held)
 
     def _among(self, solids: Deposits, spheres: Stands) -> Deposits:
         """The solids with the standing spheres as the last class."""
@@ -149,7 +147,9 @@ class FinerClasses:
 
     @property
     def _held(self) -> float:
-        return float(sum(getattr(self.solids, name).sum() for name in HELD))
+        """m3 of them that rest in the specimen."""
+        parts = (self.solids.in_pores, self.solids.attached, self.solids.in_throats)
+        return float(sum(one.sum() for one in parts))
 
     def solve(self, flow: Flow) -> None:
         """Take the `flow` of the last solve."""
@@ -158,12 +158,6 @@ class FinerClasses:
         first = np.unique(self.network.pore_group, return_index=True)[1]
         self.flux, self.pressure = flow.throat_flux, flow.pore_pressure[first]
         self.solved = self._held
-
-    @property
-    def own(self) -> SizeClasses:
-        """The classes (C) without the spheres."""
-        names = [one.name for one in fields(SizeClasses)]
-        return SizeClasses(**{name: getattr(self.classes, name)[:-1] for name in names})
 
     @property
     def resistance(self) -> float:
@@ -202,9 +196,6 @@ class FinerClasses:
         self.kept = np.ones(self.sieve.ends.shape)
 
 
-HELD = ("in_pores", "attached", "in_throats")  # The solids at rest in the specimen
-
-
 def finer_classes(
     case: InvasionCase, scales: InvasionScales, network: Network, halves: Array, flow: Flow
 ) -> FinerClasses | None:
@@ -231,6 +222,7 @@ def finer_classes(
         network=network,
         sieve=sieve,
         classes=SizeClasses(**classes),
+        own=finer,
         bed=bed_of(case, scales, scales.darcy_velocity),
         sticking=choices.sticking,
         release=release_of(case),
