@@ -246,7 +246,7 @@ def advanced(
         *(streams.outlet, filtrate, fluid_void(sieve, solids), np.maximum(sieve.void, 1e-30)),
         *(what.solid, what.full, what.gap, what.bare, np.maximum(sieve.passage, 1e-12)),
         *(sieve.reach / sieve.winding, what.filtering, classes.diameter, classes.volume),
-        *(high, np.maximum(high - low, 1e-12)),
+        *(high, 1.0 / np.maximum(high - low, 1e-12)),
         *(new.carried, new.in_pores, new.attached, new.in_throats, new.passed),
     )
     come = classes.concentration

@@ -99,7 +99,7 @@ def sweep(
     diameter: Array,
     volume: Array,
     high: Array,
-    width: Array,
+    over: Array,
     carried: Array,
     in_pores: Array,
     attached: Array,
@@ -110,9 +110,10 @@ def sweep(
 
     The first six describe the flow (`Streams`). Pores (N) have `fluid` and `void` m3 and the
     filling that `deposit.Holding` describes, throats (T) a `passage` m and a clean `way` m, on
-    which `filtering` (C,) 1/m acts. Classes have a `diameter`, the `volume` of one fine, and the
-    logarithm of their `high` end and `width`. The last five change. `carried` (N, C) m3 is what
-    the pores and the `filtrate` bring; at each pore it becomes a concentration first.
+    which `filtering` (C,) 1/m acts. Classes have a `diameter`, the `volume` of one fine, the
+    logarithm of their `high` end, and `over`, 1 over its distance from that of the low end. The
+    last five change. `carried` (N, C) m3 is what pores and `filtrate` bring; at each pore it
+    becomes a concentration first.
     """
     start, slope, most = LOADED
     for place in range(len(order)):
@@ -131,29 +132,34 @@ def sweep(
             throat, behind, flow = link[k], target[k], filtrate * share[k]
             near = (solid[n] + solid[behind]) / (void[n] + void[behind])
             chance = min(start * (near > NONE) + slope * near, most)
-            clean, beside, room = math.log(passage[throat]), min(gap[n], gap[behind]), 1.0
-            for i in range(len(volume)):
-                room -= in_throats[throat, i] / volume[i]
+            clean, beside, room = math.log(passage[throat]), min(gap[n], gap[behind]), 2.0
+            narrow = 1.0 / passage[throat]
             # wide ones first, for a throat has room for one fine
             for i in range(len(volume) - 1, -1, -1):
                 moved = flow * carried[n, i]
                 if moved <= 0.0:
                     continue
-                wide = min(max((high[i] - clean) / width[i], 0.0), 1.0)
-                near_wide = min(max((high[i] - beside) / width[i], 0.0), 1.0)
-                bed = min(max((high[i] - gap[behind]) / width[i], 0.0), 1.0)
-                loose = (1.0 - wide) * (1.0 - bridging_chance(diameter[i] / passage[throat]))
+                wide = min(max((high[i] - clean) * over[i], 0.0), 1.0)
+                near_wide = min(max((high[i] - beside) * over[i], 0.0), 1.0)
+                bed = min(max((high[i] - gap[behind]) * over[i], 0.0), 1.0)
+                loose = (1.0 - wide) * (1.0 - bridging_chance(diameter[i] * narrow))
                 loose *= (1.0 - chance * near_wide) * (1.0 - full[behind] * bed)
                 sticks = 0.0
                 if filtering[i] > 0.0:
                     sticks = -math.expm1(-filtering[i] * way[throat] * bare[n])
                 held = moved * (1.0 - loose * (1.0 - sticks))
                 carried[behind, i] += moved - held
+                if held <= 0.0:
+                    continue
                 if sticks > 0.0:
                     stuck = min(moved * sticks, held)  # not above it by rounding
                     attached[n, i] += stuck
                     held -= stuck
-                if diameter[i] <= WEDGES * passage[throat]:
+                if diameter[i] * narrow <= WEDGES:
+                    if room > 1.0:
+                        room = 1.0
+                        for j in range(len(volume)):
+                            room -= in_throats[throat, j] / volume[j]
                     wedged = min(held, max(room, 0.0) * volume[i])
                     room -= wedged / volume[i]
                     in_throats[throat, i] += wedged
