@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fdnet.case.spheres import Fines
+from fdnet.classes import invasion
 from fdnet.classes.capture import (
     Bed,
     SizeClasses,
@@ -281,3 +282,15 @@ def test_a_class_wider_than_every_throat_stays_at_the_face():
     assert end.stop_reason == "plugged"
     assert end.solids.cake[0] > 0
     assert not np.any(end.solids.in_pores[~sieve.inlet])
+
+
+def test_a_tenth_of_the_step_hardly_changes_the_permeability(monkeypatch):
+    """What the deposit holds back is that of the middle of a step, and not of its beginning."""
+    sieve, flow = pack()
+    classes, whole = sizes(0.4, 0.6, concentration=0.2), course(sieve, supply=10.0, plug_time=4e3)
+    long = invade_classes(sieve, classes, whole, flow)
+    monkeypatch.setattr(invasion, "CHANGE", 0.1 * invasion.CHANGE)
+    monkeypatch.setattr(invasion, "FIRST_STEP", 0.1 * invasion.FIRST_STEP)
+    short = invade_classes(sieve, classes, whole, flow)
+    assert len(short.rows) > 8 * len(long.rows)
+    assert long.rows[-1]["k_over_k0"] == pytest.approx(short.rows[-1]["k_over_k0"], rel=0.04)
