@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fdnet.classes.capture import TIGHT, SizeClasses, covered, wider_share
-from fdnet.classes.transport import Streams, pile_up, sweep
+from fdnet.classes.transport import Streams, carry, pile_up
 from fdnet.network.flow.flow import PLANE_TOLERANCE
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, frozen, one_line
@@ -241,7 +241,7 @@ def advanced(
     new = replace(solids, **{name: getattr(solids, name).copy() for name in names})
     new.carried[face] += entered * what.feed
     low, high = np.log(classes.low), np.log(classes.high)
-    sweep(
+    carry(
         *(streams.order, streams.first, streams.target, streams.link, streams.share),
         *(streams.outlet, filtrate, fluid_void(sieve, solids), np.maximum(sieve.void, 1e-30)),
         *(what.solid, what.full, what.gap, what.bare, np.maximum(sieve.passage, 1e-12)),

@@ -79,7 +79,7 @@ WEDGES = 1.3
 
 
 @loops_in_place
-def sweep(
+def carry(
     order: Array,
     first: Array,
     target: Array,
