@@ -5,6 +5,8 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
+from sphinx.application import Sphinx
+
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "_ext"))
 
@@ -27,6 +29,7 @@ smartquotes_action = "D"  # dashes alone, quotation marks stay straight
 nitpicky = True
 nitpick_ignore_regex = [("py:class", r".*")]  # types in signatures, of ours and of others
 
+smartquotes_action = "qe"  # no dashes: an option keeps its two hyphens
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_block", "colon_fence", "deflist", "dollarmath"]
 
@@ -65,3 +68,9 @@ html_theme_options = {
     "footer_start": ["copyright"],
     "footer_end": [],
 }
+
+
+def setup(app: Sphinx) -> None:
+    """Leaves out how classes are constructed: their page names the function that makes one."""
+    constructors = {"__init__", "__new__"}
+    app.connect("autodoc-skip-member", lambda *of: True if of[2] in constructors else None)

@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from fdnet.errors import LiggghtsError as LiggghtsError
     from fdnet.errors import MechanicsError as MechanicsError
     from fdnet.errors import NetworkError as NetworkError
-    from fdnet.formation.handed_up import hand_up as hand_up
     from fdnet.formation.scale_up import core_flood as core_flood
+    from fdnet.formation.scale_up import hand_up as hand_up
     from fdnet.formation.scale_up import well_invasion as well_invasion
     from fdnet.mechanics.of_case import elastic_moduli as elastic_moduli
     from fdnet.mechanics.of_case import triaxial_test as triaxial_test
@@ -63,8 +63,7 @@ _HOMES = {
     "fdnet.run.pipeline": "run_case",
     "fdnet.run.finished": "open_run",
     "fdnet.campaign.api": "open_runs ensemble sweep compare_runs",
-    "fdnet.formation.handed_up": "hand_up",
-    "fdnet.formation.scale_up": "core_flood well_invasion",
+    "fdnet.formation.scale_up": "core_flood hand_up well_invasion",
     "fdnet.spheres.snapshot": "Snapshot",
     "fdnet.spheres.readers": "read_spheres",
     "fdnet.network.permeability": "permeability analyse compare",

@@ -25,7 +25,7 @@ NETWORK_LAYERS = [
 ROOMS = {
     "fdnet": LAYERS,
     "fdnet.campaign": [["plan"], ["engine", "result"], ["page"], ["api"]],
-    "fdnet.formation": [["model"], ["handed_up"], ["scale_up"]],
+    "fdnet.formation": [["model"], ["scale_up"]],
     "fdnet.network": NETWORK_LAYERS,
 }
 DOORS = {

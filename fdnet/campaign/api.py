@@ -137,9 +137,10 @@ def _carried_out(
     **how: Any,
 ) -> Compared:
     plan = plan_of(limit=jobs_limit, ranks=ranks, stages=tuple(stages))
+    limits = results.read_targets(plan.targets)
     jobs = max(1, cores() // ranks) if jobs is None else jobs
     running, folder = HowToRun(jobs=jobs, quiet=not progress, **how), expanded(out)
-    return write_comparison(carry_out(folder, plan, running, ranked_by), {})
+    return write_comparison(carry_out(folder, plan, running, ranked_by), limits)
 
 
 # ---- From a plan to its comparison.

@@ -59,9 +59,8 @@ class HowToRun:
     def options(self) -> list[str]:
         """Options of `fdnet run` that are not those of the plan."""
         path = self.liggghts and str(Path(self.liggghts).expanduser().absolute())
-        timeout = None if self.timeout is None else repr(self.timeout)
-        given = {"--liggghts": path, "--launcher": self.launcher, "--timeout": timeout}
-        return [word for name, value in given.items() if value for word in (name, value)]
+        given = {"--liggghts": path, "--launcher": self.launcher, "--timeout": self.timeout}
+        return [str(word) for name, value in given.items() if value for word in (name, value)]
 
     def refuse(self) -> None:
         """Raise CaseError where Snakemake is asked for and not installed."""
@@ -166,8 +165,7 @@ def _stop(running: Iterable[subprocess.Popen], kill: Callable[..., None], number
 # ---- The pool: some processes at a time on this machine, nothing else needed.
 def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Callable[..., None]) -> None:
     """Run the tasks, `jobs` at a time; one that fails stops only those that need what it makes."""
-    waiting, running, full = list(tasks), dict[str, subprocess.Popen](), False
-    failed: set[str] = set()
+    waiting, running, full, failed = list(tasks), dict[str, subprocess.Popen](), False, set[str]()
     # The kernel sends SIGTERM when the parent dies, however it dies (PR_SET_PDEATHSIG).
     dies_with_parent = partial(ctypes.CDLL(None).prctl, 1, signal.SIGTERM, 0, 0, 0)
     try:
@@ -203,8 +201,7 @@ def _run_pool(path: Path, tasks: Sequence[Task], jobs: int, ended: Callable[...,
 SNAKEFILE = str(resources.files("fdnet.campaign").joinpath("Snakefile"))
 _CONFIG = f"{LOGS}/snakemake.json"
 _REASON = re.compile(
-    r"^(?!.*(?:check log file|Error in rule|Look above)).*(?:[Ee]rror|Exception|failed|locked).*$",
-    re.MULTILINE,
+    r"(?m)^(?!.*(?:check log file|Error in rule|Look above)).*(?:rror|Exception|failed|locked).*"
 )
 
 
@@ -218,11 +215,11 @@ def _run_snakemake(
 ) -> None:
     """Run what is missing as jobs of Snakemake, which cancels them when it is stopped by SIGINT.
 
-    It inherits the lock of the folder and its name stands in it, so that no other call works there
-    while it lives, also when this process is killed.
+    It inherits the folder's lock, in which it is named: no other call works while either lives.
     """
-    write_text(path / _CONFIG, json.dumps({"options": how.options}))
     words, log = _snakemake_words(how, plan), _log(path, "snakemake")
+    config = {"options": how.options, "slurm_conf": os.environ.get("SLURM_CONF")}
+    write_text(path / _CONFIG, json.dumps(config))
     if os.pread(lock, 1, 0) and any(path.glob(".snakemake/locks/*")):
         how.say("an earlier Snakemake was killed here; its lock is removed")
         _start([*words, "--unlock"], path, log).wait()
@@ -244,8 +241,10 @@ def _run_snakemake(
         _stop([process], os.killpg, signal.SIGINT)
         os.truncate(lock, 0)
     if process.returncode and not any(last_words(_log(path, task.name)) for task in tasks):
-        lines = _REASON.findall(log.read_text("utf-8", "replace"))
-        reasons = " | ".join(dict.fromkeys(line.strip() for line in lines))[:1000]
+        said = log.read_text("utf-8", "replace")
+        for job in re.findall(r"SLURM jobid \S+ \(log: (.+)\)", said)[-1:]:  # what it says itself
+            said = Path(job).read_text("utf-8", "replace") + said if Path(job).exists() else said
+        reasons = " | ".join(dict.fromkeys(map(str.strip, _REASON.findall(said))))[:1000]
         problem = f"Snakemake ended with exit code {process.returncode} before any run"
         raise CaseError(f"{log}: {problem}: {reasons or last_words(log)}")
 
@@ -255,6 +254,7 @@ def _snakemake_words(how: HowToRun, plan: Plan) -> list[str]:
     words += ["--until", "run", "--keep-going", "--rerun-incomplete"]
     if how.engine == "snakemake":
         return [*words, "--cores", str(how.jobs * plan.ranks)]
+    words = ["env", "-u", "SLURM_JOB_ID", *words]  # in a job the executor drops SLURM_CONF
     words += ["--executor", "slurm", "--jobs", str(how.jobs), "--latency-wait", "30"]
     with contextlib.suppress(OSError):  # without accounting sacct would see no job end
         if subprocess.run(["sacct", "-X"], capture_output=True, check=False).returncode:

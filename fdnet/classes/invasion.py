@@ -184,9 +184,13 @@ def cake_resistance(
 
 
 def invade_classes(
-    sieve: Sieve, classes: SizeClasses, course: Course, flow_with: PackStateOf
+    sieve: Sieve,
+    classes: SizeClasses,
+    course: Course,
+    flow_with: PackStateOf,
+    watch: Callable[[int, Deposits, Flow], None] = lambda *_: None,
 ) -> ClassInvasion:
-    """Let the mud in until the course ends."""
+    """Let the mud in until the course ends; `watch` sees each row's state."""
     solids, pores = no_solids(sieve, classes), float(sieve.void.sum())
     kept, rows, by_class, time, filtrate = np.ones(sieve.ends.shape), [], [], 0.0, 0.0
     wanted, quiet, reason, mud = FIRST_STEP * pores, 0.0, "", float(classes.concentration.sum())
@@ -218,6 +222,7 @@ def invade_classes(
                 "pressure_pack_Pa": drop,
             }
         )
+        watch(len(rows) - 1, solids, state.flow)
         reason = reason or ("plugged" if velocity <= 0 else "")
         if reason:
             break

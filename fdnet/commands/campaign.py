@@ -85,14 +85,13 @@ def _finish(
     return SOME_FAILED if comparison.failed else 0
 
 
-def _run_campaign(
-    options: argparse.Namespace, plan: "Plan", limits: Mapping[str, float] | None = None
-) -> int:
+def _run_campaign(options: argparse.Namespace, plan: "Plan") -> int:
     """Carry out a plan and write its results; returns the exit code."""
     from fdnet.campaign.api import carry_out
     from fdnet.campaign.plan import plan_lines
+    from fdnet.campaign.result import read_targets
 
-    how = _how_of(options)
+    how, limits = _how_of(options), read_targets(plan.targets)
     if options.dry_run:
         by = "fdnet itself" if how.engine == "local" else "Snakemake"
         by = f"Slurm with {', '.join(how.resources)}" if how.engine == "slurm" else by
@@ -145,10 +144,10 @@ def _run_ensemble(options: argparse.Namespace) -> int:
 
 def _run_sweep(options: argparse.Namespace) -> int:
     from fdnet.campaign.plan import sweep_plan
-    from fdnet.campaign.result import read_targets
 
-    plan = sweep_plan(options.sweep, fast=options.fast, **_plan_options(options))
-    return _run_campaign(options, plan, read_targets(plan.targets))
+    return _run_campaign(
+        options, sweep_plan(options.sweep, fast=options.fast, **_plan_options(options))
+    )
 
 
 def _run_compare(options: argparse.Namespace) -> int:

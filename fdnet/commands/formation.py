@@ -3,7 +3,6 @@
 import argparse
 import json
 import sys
-from collections.abc import Callable
 from functools import partial
 from inspect import signature
 from typing import Any
@@ -12,49 +11,44 @@ from fdnet.case.units import converted
 from fdnet.commands.options import new_command
 from fdnet.files import path_option
 
-CORE, WELL = "the core", "the well"
-
 
 def add_formation(commands: Any) -> None:
     """Adds `fdnet core` and `well` to the command line."""
     about = "flood a core of a run's sand with its mud, and turn the flow back"
     example = "fdnet core runs/mine --length 76mm --rate 1ml/min"
     core = new_command(commands, "core", partial(_finish, "core"), about, example)
-    core.add(CORE, "--length LENGTH", "of the core, as 76mm", _si("_m"), required=True)
-    core.add(CORE, "--diameter LENGTH", "of the core (default 38 mm)", _si("_m"), 0.038)
-    core.add(CORE, "--rate RATE", "of the flood, as 1ml/min", _si("_m3_s"))
-    core.add(CORE, "--pressure PRESSURE", "over core and cake, as 7bar", _si("_Pa"))
-    core.add(CORE, "--minutes N", "length of the flood (default 30)", float, 30.0)
-    back = "pore volumes that flow back, where the run had a [clean_up] (default 10)"
-    core.add(CORE, "--back-flow N", back, float, 10.0)
-    core.add(CORE, "--sections N", "between pressure taps (default 4)", int, 4)
-
     about = "carry a run to a well: filtrate, invaded radius, k by depth, cake, skin"
     example = "fdnet well runs/mine --hours 12 --api-filtrate 8ml"
     well = new_command(commands, "well", partial(_finish, "well"), about, example)
-    well.add(WELL, "--hours N", "that the mud stands (default 12)", float, 12.0)
-    well.add(WELL, "--height LENGTH", "of the well (default 1 m)", _si("_m"), 1.0)
-    over = "overbalance, as 300psi (default: of the case)"
-    well.add(WELL, "--pressure PRESSURE", over, _si("_Pa"))
-    well.add(WELL, "--radius LENGTH", "of the well (default: of the case)", _si("_m"))
+    length, pressure = partial(_si, "_m"), partial(_si, "_Pa")
+    for parser, spec, text, kind in (
+        (core, "--length LENGTH", "of the core, as 76mm", length),
+        (core, "--diameter LENGTH", "of the core (default 38 mm)", length),
+        (core, "--rate RATE", "of the flood, as 1ml/min", partial(_si, "_m3_s")),
+        (core, "--pressure PRESSURE", "over core and cake, as 7bar", pressure),
+        (core, "--minutes N", "length of the flood (default 30)", float),
+        (core, "--back-flow N", "pore volumes back after a [clean_up] (default 10)", float),
+        (core, "--sections N", "between pressure taps (default 4)", int),
+        (well, "--hours N", "that the mud stands (default 12)", float),
+        (well, "--pressure PRESSURE", "overbalance, as 300psi (default: of the case)", pressure),
+        (well, "--radius LENGTH", "of the well (default: of the case)", length),
+    ):
+        required: Any = {"required": True} if spec.startswith("--length") else {}
+        parser.add(f"the {parser.prog.split()[-1]}", spec, text, kind, **required)
     run = "run folder, or the folder of an ensemble, whose seeds then give the bands"
     api = "of the mud in 30 minutes, as 8ml: gives the permeability of the cake"
-    for parser, group in ((core, CORE), (well, WELL)):
+    for parser, group in ((core, "the core"), (well, "the well")):
         parser.add(group, "run RUN", run, path_option)
-        parser.add(group, "--api-filtrate VOLUME", api, _si("_m3"))
+        parser.add(group, "--api-filtrate VOLUME", api, partial(_si, "_m3"))
         parser.share("--json", "--quiet")
 
 
-def _si(suffix: str) -> Callable[[str], float]:
-    """Reads a value with its unit in SI."""
-
-    def value(text: str) -> float:
-        try:
-            return converted(text, suffix)
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(f"{text!r}: {error}") from error
-
-    return value
+def _si(suffix: str, text: str) -> float:
+    """A value with its unit in SI."""
+    try:
+        return converted(text, suffix)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: {error}") from error
 
 
 def _finish(name: str, options: argparse.Namespace) -> int:
@@ -64,8 +58,9 @@ def _finish(name: str, options: argparse.Namespace) -> int:
     from fdnet.formation.scale_up import core_flood, keep, well_invasion, with_band
 
     model: Any = core_flood if name == "core" else well_invasion
-    known = signature(model).parameters
-    given = {key: value for key, value in vars(options).items() if key in known}
+    asked = {key: value for key, value in vars(options).items() if value is not None}
+    known = {key: one.default for key, one in signature(model).parameters.items()}
+    given = {key: asked.get(key, default) for key, default in known.items() if key != "source"}
     found = model(options.run, **given)
     keep(options.run, name, found, given)
     if options.json:

@@ -1,11 +1,7 @@
 """Fines carried into a core or around a well, in one dimension: filtration, Darcy, a cake.
 
-The volume V that has flowed in takes the place of time (Iwasaki 1937; Herzig, Leclerc and Le Goff
-1970): at a depth where the flow crosses the area A,
-
-    phi dc_i/dV + dc_i/dx / A = - ds_i/dV,    A ds_i/dV = rate_i (1 + growth_i s) c_i.
-
-Formulas, sources and cells are derived on docs/theory/from_core_to_well.md.
+The volume that has flowed in takes the place of time. Formulas, sources and cells are derived on
+docs/theory/from_core_to_well.md.
 """
 
 import math
@@ -15,21 +11,34 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_banded
+from scipy.special import exprel
 
 from fdnet.spheres.snapshot import Array
 
-FINENESS = 0.05
-"""Largest step over the volume since the last change, and of a deposit's effect at the face."""
-_LANDED = 1e-10
+FINENESS, TINY = 0.05, 1e-12  # Largest relative step, and what is as good as nothing
+STRAIGHT = 1e9  # m, radius of a face that is as good as plane: over 0.1 m it errs by 5e-11
+FULL = "the cake of these fines alone fills the hole"
+CLOSED = "the face has the deposit of the run's end, and its cake is not known"
+CAKE_SKINS = {
+    "linear": lambda h: h,
+    "radial": lambda h: math.log1p(2 * h) / 2,
+    "linrad": lambda h: math.log1p(h),
+    "inward": lambda h: -math.log1p(-2 * h) / 2 if 2 * h < 1 else math.inf,
+}
+"""Skin of a cake as permeable as the rock, by its volume over the face and the well's radius.
+
+Times k / k_c it is that of the cake. The first three are those of OPM Flow; inwards the cake
+stands inside the well, which it fills at one half.
+"""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Column:
-    """The way of the flow, straight or outwards from a well, in J cells."""
+    """The way of the flow outwards from a well, or along a straight core, in J cells."""
 
     edges: Array  # (J+1,) m, depths from the face, 0 first
     area: float  # m2, of the face
-    well: float = math.inf  # m, radius of the face; infinite for a straight core
+    well: float = STRAIGHT  # m, radius of the face
     outer: float = 0.0  # m, depth where the pressure is held; sound rock up to it
 
     @property
@@ -40,35 +49,27 @@ class Column:
 
     def reach(self, depth: Any) -> Array:
         """Integral of dx / A from the face to depths (N,) m, 1/m; over k it is a resistance."""
-        x = np.asarray(depth, float)
-        way = x if math.isinf(self.well) else np.log1p(x / self.well) * self.well
-        return np.asarray(way / self.area)
+        return np.log1p(np.asarray(depth) / self.well) * self.well / self.area
+
+    def skin(self, loss: Array) -> float:
+        """Integral of (k0 / k - 1) dr / r over the cells, `loss` being k0 / k (J,)."""
+        over_r = np.diff(self.reach(self.edges)) * self.area / self.well
+        return float((loss - 1.0) @ over_r)
 
 
-def steep_grid(length: float, cells: int, scale: float) -> Array:
-    """(J+1,) edges, m, of cells that grow by one factor, slowly within `scale` m of the face."""
-    return np.geomspace(scale, scale + length, cells + 1) - scale
-
-
-class FineClass(NamedTuple):
-    """Fines that are filtered alike."""
-
-    name: str
-    concentration: float  # their volume over that of the mud
-    rate: float  # 1/m, the filtration coefficient of clean rock
-    growth: float = 0.0  # its relative growth with the deposit of all classes
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Medium:
-    """A rock and a mud as the model knows them, SI units."""
+    """A rock and a mud of C classes of fines as the model knows them, SI units."""
 
     porosity: float  # of sound rock
     permeability: float  # m2, of sound rock; a deposit s leaves 1 / (1 + damage s)^power of it
     damage: float = 0.0
     power: float = 2.0
     viscosity: float = 1e-3  # Pa s
-    mud: tuple[FineClass, ...] = ()
+    names: tuple[str, ...] = ("all",)  # of the classes
+    solids: Array  # (C,) their volume over that of the mud
+    rate: Array  # (C,) 1/m, their filtration coefficient in clean rock
+    growth: Array  # (C,) its relative growth with the deposit of all classes
     closing: float = math.inf  # deposit of the face that closes it; 0: at once, infinite: never
     cake_porosity: float = 0.5
     # m2, of what the solids build on the closed face; without it nothing is known from then on
@@ -76,14 +77,18 @@ class Medium:
     released: float = 0.0  # share of the deposit that back-flow can take away
     release_rate: float = 0.0  # 1/m, how fast it decays with the back-flow over the area
 
-    @property
-    def solids(self) -> float:
-        """Volume of all fines over that of the mud."""
-        return sum(one.concentration for one in self.mud)
-
     def loss(self, deposit: Array) -> Array:
         """k0 / k of a deposit (J,) of all classes."""
         return (1.0 + self.damage * deposit) ** self.power
+
+    def at_face(self, deposit: float) -> tuple[float, float]:
+        """Area times ds/dV at a `deposit` of the face, and its slope with it."""
+        slope = float(self.rate * self.growth @ self.solids) or 1e-30
+        return float(self.rate @ self.solids) + slope * deposit, slope
+
+    def closes(self, deposit: float) -> bool:
+        """Whether a `deposit` closes the face."""
+        return deposit >= self.closing * (1 - TINY)
 
 
 class Flood(NamedTuple):
@@ -98,34 +103,14 @@ class Flood(NamedTuple):
         return self.pressure / resistance if self.rate is None else self.rate
 
 
-def cake_skin(shape: str, thickness: float, well: float) -> float:
-    """Skin of a cake as permeable as the formation; times k / k_c it is that of the cake.
-
-    For its thickness h m (volume over the face) at a well of radius r m: "linear" h / r, "radial"
-    ln(sqrt(r^2 + 2 r h) / r), "linrad" ln((r + h) / r) as OPM Flow has them, and "inward"
-    ln(r / sqrt(r^2 - 2 r h)), a cake inside the well.
-    """
-    ratio = thickness / well
-    if shape in ("linear", "linrad"):
-        return ratio if shape == "linear" else math.log1p(ratio)
-    sign = 1 if shape == "radial" else -1
-    return sign * math.log1p(sign * 2 * ratio) / 2 if sign * 2 * ratio > -1 else math.inf
-
-
-def damage_skin(column: Column, loss: Array) -> float:
-    """Integral of (k0 / k - 1) dr / r over the cells, `loss` being k0 / k (J,)."""
-    over_r = np.diff(column.reach(column.edges)) * column.area / column.well
-    return float((loss - 1.0) @ over_r)
-
-
 class Filled(NamedTuple):
     """Where the fines of C classes are, in J cells."""
 
     suspended: Array  # (C, J) volume of fines over that of fluid
     deposit: Array  # (C, J) over bulk volume
-    held: Array  # (C, J) the part of the deposit that back-flow cannot take
+    loose: Array  # (C, J) the part of the deposit that back-flow can take away
     face: float  # deposit of all classes at the face itself
-    cake: Array  # (C,) m3
+    cake: float  # m3 before the face, with its pores
 
 
 class March(NamedTuple):
@@ -139,7 +124,7 @@ class March(NamedTuple):
     effluent: Array  # (N, C) volume of fines over volume of fluid that leaves
     end: Filled  # the last state
     closed_at: float | None  # s, when the cake began first; None: never
-    stopped: str  # "closed": the face did and its cake is not known; "full": the well is, of cake
+    stopped: str  # why it ended early, `FULL` or `CLOSED`; else empty
 
 
 def march(
@@ -153,55 +138,45 @@ def march(
     """The mud driven through the column by one of the `drives` after the other, from clean rock.
 
     A back-flow lifts the cake first. `taps` (S+1,) m are the depths between which sections are
-    measured, by default the ends. `fineness` is the largest relative step; the error falls with
-    it to first order.
+    measured, by default the ends. `fineness` is the largest step over the volume of the drive; the
+    error falls with it to first order.
     """
-    none, mu = np.zeros(len(medium.mud)), medium.viscosity
-    cells = np.zeros((len(none), len(column.edges) - 1))
-    state = Filled(cells, cells, cells, 0.0, none)
-    at = column.reach(column.edges[[0, -1]] if taps is None else taps)
-    small = fineness / 10 * medium.porosity * float(column.volume.sum())
-    time, filtrate, closed_at, stopped = 0.0, 0.0, None, ""
+    cells, mu = np.zeros((len(medium.rate), len(column.edges) - 1)), medium.viscosity
+    state, ends = Filled(cells, cells, cells, 0.0, 0.0), column.edges[[0, -1]]
+    at = column.reach([*(ends if taps is None else taps), max(column.outer, ends[-1])])
+    start, slope = medium.at_face(0.0)
+    quick = (abs(slope) + medium.damage * medium.power * start) / column.area  # 1/m3, the face
+    first = fineness / (quick + 10 / (medium.porosity * column.volume.sum()))
     parts, rows = _resistances(column, medium, at, state), list[tuple[Any, ...]]()
+    rows.append((0.0, 0.0, drives[0].flow(mu * parts.sum()), parts, cells[:, 0]))
+    time, filtrate, closed_at, stopped = 0.0, 0.0, None, ""
     for drive in drives:
-        end, since, back = time + drive.seconds, 0.0, drive.flow(1.0) < 0
-        if back:
-            held = np.maximum(state.held, (1 - medium.released) * state.deposit)
-            state = state._replace(cake=none, held=held)
+        end, since, way = time + drive.seconds, 0.0, math.copysign(1.0, drive.flow(1.0))
+        if way < 0:
+            state = state._replace(cake=0.0)
             parts = _resistances(column, medium, at, state)
-        if not rows:
-            rows.append((time, filtrate, drive.flow(mu * parts.sum()), parts, none))
-        while time < end and not stopped:
-            shut = not back and state.face >= medium.closing
-            if shut:
-                closed_at = time if closed_at is None else closed_at
-                if medium.cake_permeability is None:
-                    stopped = "closed"
+        while time < end:
+            if way > 0 and closed_at is None and medium.closes(state.face):
+                closed_at = time
+            step, over = fineness * since + first, math.inf
+            while over > 1 + TINY:  # the step ends where the drive does, or the face closes
+                after, effluent = _moved(state, column, medium, way * step)
+                met = _resistances(column, medium, at, after)
+                if np.isinf(met[0]):
                     break
-            step, to_closing = fineness * since + small, math.inf
-            if not back and not shut:
-                most, to_closing = _until(state, column, medium, fineness)
-                step = min(step, most, to_closing)
-            early = -math.inf
-            while early < -_LANDED:
-                after, effluent = _moved(state, column, medium, step, back, shut)
-                new = _resistances(column, medium, at, after)
-                if not np.isfinite(new).all():
-                    stopped = "full"
-                    break
-                seconds, tried = step / abs(drive.flow(mu * (parts + new).sum() / 2)), step
-                early = (end - time - seconds) / drive.seconds
-                step *= min((end - time) / seconds, 1.0)
-            if stopped:
+                seconds = step / abs(drive.flow(mu * (parts + met).sum() / 2))
+                closer = (after.face - state.face) / max(medium.closing - state.face, TINY)
+                over = max(seconds / (end - time), closer)
+                step /= max(over, 1.0)
+            if np.isinf(met[0]):
+                stopped = FULL if medium.cake_permeability else CLOSED
                 break
-            time = end if early <= _LANDED else time + seconds
-            filtrate, since = filtrate + (-tried if back else tried), since + tried
-            if tried == to_closing:
-                after, since = after._replace(face=medium.closing), 0.0
-            state, parts = after, new
+            left = end - time - seconds
+            time = end if left < TINY * drive.seconds else time + seconds
+            filtrate, since, state, parts = filtrate + way * step, since + step, after, met
             rows.append((time, filtrate, drive.flow(mu * parts.sum()), parts, effluent))
     times, volumes, rates, met, effluents = (np.array(one) for one in zip(*rows, strict=True))
-    kept = np.diff(at) / medium.permeability / met[:, 1:-1]
+    kept = np.diff(at)[:-1] / medium.permeability / met[:, 1:-1]
     drops = mu * rates[:, None] * met
     return March(times, volumes, rates, drops, kept, effluents, state, closed_at, stopped)
 
@@ -209,76 +184,47 @@ def march(
 def _resistances(column: Column, medium: Medium, at: Array, state: Filled) -> Array:
     """(S+2,) resistances over viscosity, 1/m3, of cake, sections and the rest of the way.
 
-    The sections lie between the `at` (S+1,), as `Column.reach`. A cake that fills the well has an
-    infinite one.
+    Sections and the rest lie between the `at` (S+2,), as `Column.reach`. A cake that fills the
+    well has an infinite one, and so has one that is not known.
     """
-    reach, loss = column.reach(column.edges), medium.loss(state.deposit.sum(axis=0))
-    cells = np.append(0.0, np.cumsum(np.diff(reach) * loss))
-    inside = np.interp(at, reach, cells)
-    outer = float(column.reach(max(column.outer, column.edges[-1])) - reach[-1])
-    own = 0.0
-    if medium.cake_permeability and state.cake.any():
-        thick = state.cake.sum() / ((1 - medium.cake_porosity) * column.area)
-        if math.isfinite(column.well):
-            own = cake_skin("inward", thick, column.well) * column.well / column.area
-        else:
-            own = thick / column.area
-        own *= medium.permeability / medium.cake_permeability
-    return np.array([own, *np.diff(inside), cells[-1] - inside[-1] + outer]) / medium.permeability
+    reach = np.append(column.reach(column.edges), at[-1])
+    loss = np.append(medium.loss(state.deposit.sum(axis=0)), 1.0)
+    inside = np.interp(at, reach, np.append(0.0, np.cumsum(np.diff(reach) * loss)))
+    cake, own = CAKE_SKINS["inward"](state.cake / column.area / column.well), math.inf
+    if medium.cake_permeability or not cake:
+        own = cake * column.well / column.area / (medium.cake_permeability or 1.0)
+    return np.array([own, *np.diff(inside) / medium.permeability])
 
 
-def _at_the_face(medium: Medium, face: float) -> tuple[float, float]:
-    """Area times ds/dV at the deposit `face`, and its slope with the deposit."""
-    start = sum(one.rate * (1 + one.growth * face) * one.concentration for one in medium.mud)
-    return start, sum(one.rate * one.growth * one.concentration for one in medium.mud)
+def _moved(state: Filled, column: Column, medium: Medium, volume: float) -> tuple[Filled, Array]:
+    """The state after a `volume` m3 of flow, below 0 back, and the mean (C,) that leaves.
 
-
-def _until(state: Filled, column: Column, medium: Medium, fineness: float) -> tuple[float, float]:
-    """Volume m3 in which the face changes little, and that until it closes (infinite: never)."""
-    start, slope = _at_the_face(medium, state.face)
-    limits = [2 * fineness / abs(slope)] if slope else []
-    if start > 0 and medium.damage > 0:
-        limits.append(fineness * (1 / medium.damage + state.face) / medium.power / start)
-    full = (medium.closing - state.face) / start if start > 0 else math.inf
-    if slope:
-        full = math.log1p(full * slope) / slope if full * slope > -1 else math.inf
-    return column.area * min(limits, default=math.inf), column.area * full
-
-
-def _moved(
-    state: Filled, column: Column, medium: Medium, volume: float, back: bool, shut: bool
-) -> tuple[Filled, Array]:
-    """The state after a `volume` m3 of flow, and the mean (C,) that leaves.
-
-    The filtration coefficients are those of the deposit half-way. Through a shut face no fines
+    The filtration coefficients are those of the deposit half-way. Through a closed face no fines
     enter; the mud whose place the cake takes brings its own solids.
     """
-    _, solids, rate, growth = (np.array(one) for one in zip(*medium.mud, strict=True))
-    width, bulk, inflow = np.diff(column.edges), column.volume, np.zeros_like(state.deposit)
-    pores = medium.porosity * bulk
-    if back:
-        pace = medium.release_rate * volume
-        freed = (state.deposit - state.held) * -np.expm1(-pace * width / bulk)
-        source = (freed * bulk / volume)[:, ::-1]
-        out, last = _sweep(source, state.suspended[:, ::-1], pores[::-1], inflow, volume)
-        face = state.face * (1 + medium.released * math.expm1(-pace / column.area))
-        deposit = state.deposit - freed
-        return state._replace(suspended=last[:, ::-1], deposit=deposit, face=face), out[:, -1]
-    start, slope = (one * volume / column.area for one in _at_the_face(medium, state.face))
-    if shut:
-        free = 1 - medium.cake_porosity
-        built = free * solids / (free - solids.sum()) * volume
-        state = state._replace(cake=state.cake + built)
-        solids, start, slope = 0.0 * solids, 0.0, 0.0
-    inflow[:, 0] = solids
-    total = before = state.deposit.sum(axis=0)
-    for _ in range(2 if growth.any() else 1):
-        catch = rate[:, None] * (1 + growth[:, None] * total) * width
+    width, bulk, face, cake = np.diff(column.edges), column.volume, state.face, state.cake
+    pores, inflow, passed = medium.porosity * bulk, 0.0 * state.deposit, volume / column.area
+    if volume < 0:
+        freed = state.loose * -np.expm1(medium.release_rate * volume * width / bulk)
+        source, held = (freed * bulk / -volume)[:, ::-1], state.suspended[:, ::-1]
+        out, last = _sweep(source, held, pores[::-1], inflow, -volume)
+        face *= 1 + medium.released * math.expm1(medium.release_rate * passed)
+        left = last[:, ::-1], state.deposit - freed, state.loose - freed
+        return Filled(*left, face, cake), out[:, -1]
+    if medium.closes(face):
+        solids = medium.solids.sum()
+        cake += solids / (1 - medium.cake_porosity - solids) * volume
+    else:
+        inflow[:, 0], (start, slope) = medium.solids, medium.at_face(face)
+        face += start * passed * float(exprel(slope * passed))
+    caught = 0.0 * state.deposit
+    for _ in range(2 if medium.growth.any() else 1):
+        halfway = (state.deposit + caught / 2).sum(axis=0)
+        catch = medium.rate[:, None] * (1 + medium.growth[:, None] * halfway) * width
         out, last = _sweep(inflow, state.suspended, pores, catch, volume)
         caught = np.expm1(catch) * out * volume / bulk
-        total = before + caught.sum(axis=0) / 2
-    face = state.face + start * (math.expm1(slope) / slope if slope else 1.0)
-    return state._replace(suspended=last, deposit=state.deposit + caught, face=face), out[:, -1]
+    now = last, state.deposit + caught, state.loose + medium.released * caught
+    return Filled(*now, face, cake), out[:, -1]
 
 
 def _sweep(
@@ -293,11 +239,9 @@ def _sweep(
     exponent = np.exp(catch)
     decay = exponent * volume / pores
     left = -np.expm1(-decay)
-    stay = left / decay
-    on = (1 - stay) / exponent
-    out = np.empty_like(held)
-    for one, (pass_on, own) in enumerate(zip(on, held * stay + on * inflow, strict=True)):
-        bands = np.stack([np.ones_like(pass_on), np.append(-pass_on[1:], 0.0)])
-        out[one] = solve_banded((1, 0), bands, own, check_finite=False)
+    on, own = (1 - left / decay) / exponent, held * left / decay
+    above = np.pad(-on[:, 1:], ((0, 0), (0, 1))).ravel()  # one class after the other
+    bands = np.stack([np.ones_like(above), above])
+    out = solve_banded((1, 0), bands, (own + on * inflow).ravel()).reshape(held.shape)
     entered = inflow + np.pad(out[:, :-1], ((0, 0), (1, 0)))
     return out, entered * left / exponent + held * np.exp(-decay)

@@ -38,13 +38,10 @@ class MovieFrame(NamedTuple):
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scene:
     """What all frames share: a file of spheres (.vtp) with the grains, for states may hold the
-    fines alone; the box (3, 2) m; title and limits of the colours of the flow, "" where no flow
-    is shown; and whether standard error says how many are drawn."""
+    fines alone; the box (3, 2) m; and whether standard error says how many are drawn."""
 
     grains: Path
     box: Array
-    title: str = ""
-    limits: tuple[float, float] = (0.0, 0.0)
     told: bool = False
 
 
@@ -79,8 +76,8 @@ def draw_frames(
         [str(path.absolute()) if path else "" for path in (one.spheres, one.lines, target)]
         for one, target in zip(frames, targets, strict=True)
     ]
-    work = {name: getattr(scene, name) for name in ("title", "limits", "told")} | {"frames": rows}
-    work |= {"grains": str(scene.grains.absolute()), "box": np.asarray(scene.box).tolist()}
+    work = {"grains": str(scene.grains.absolute()), "box": np.asarray(scene.box).tolist()}
+    work |= {"told": scene.told, "frames": rows}
     package = str(Path(__file__).resolve().parents[2])
     before = os.environ.get("PYTHONPATH")
     done = subprocess.run(
@@ -114,10 +111,10 @@ def drawing_command() -> list[str]:
 
 # ---- States of a run as a movie, one after the other (GIF or MP4), or below each other (PNG).
 SECONDS_PER_FRAME = 30.0  # Time that drawing one state may take
-WIDTH, PANEL_WIDTH = 880, 1200  # Pixels of a movie, and of pictures below each other, across
-TITLE = 44  # Pixels above each of the pictures below each other
+WIDTHS = (880, 1200)  # Pixels of a movie, and of pictures below each other, across
+TITLE = 44  # Pixels above each picture, for its words
 LAST_FRAMES = 6  # How long the last state stays, in frames
-COLOURS, GIF_COLOURS = 256, 128
+COLOURS = 256
 INK = (20, 20, 20)
 
 
@@ -144,9 +141,8 @@ def write_movie(
                 f"{target}: not drawn, because {reason}; install software OpenGL "
                 "(docs/start/install.md), or open invasion.pvd in ParaView"
             ) from error
-        above = write is _write_panels
-        pairs = zip(files, frames, strict=True)
-        pictures = [_worded(file, frame.words, above=above) for file, frame in pairs]
+        width, pairs = WIDTHS[write is _write_panels], zip(files, frames, strict=True)
+        pictures = [_worded(file, frame.words, width) for file, frame in pairs]
         with replacing(target) as part:
             write(part, pictures, per_second)
     return target
@@ -161,35 +157,32 @@ def refuse_suffix(target: Path) -> None:
         raise CaseError(f"{target}: MP4 needs the package imageio-ffmpeg; {advice}")
 
 
-def _worded(path: Path, words: str, *, above: bool) -> Any:
-    """A picture with words above it, or on it; then both sides are even, as MP4 wants them."""
+def _worded(path: Path, words: str, width: int) -> Any:
+    """A picture with words above it; both sides are even, as MP4 wants them."""
     from PIL import Image, ImageDraw, ImageFont
 
     with Image.open(path) as picture:
-        share = picture.height / picture.width
-        height = round(PANEL_WIDTH * share) if above else 2 * round(0.5 * WIDTH * share)
-        drawn = picture.convert("RGB").resize((PANEL_WIDTH if above else WIDTH, height))
-    if above:
-        whole = Image.new("RGB", (PANEL_WIDTH, height + TITLE), "white")
-        whole.paste(drawn, (0, TITLE))
-        drawn = whole
-    font = ImageFont.load_default(size=26 if above else 22)
-    ImageDraw.Draw(drawn).text((16, 12), words, fill=INK, font=font)
-    return drawn
+        height = 2 * round(0.5 * width * picture.height / picture.width)
+        whole = Image.new("RGB", (width, height + TITLE), "white")
+        whole.paste(picture.convert("RGB").resize((width, height)), (0, TITLE))
+    font = ImageFont.load_default(size=24)
+    ImageDraw.Draw(whole).text((16, 12), words, fill=INK, font=font)
+    return whole
 
 
 def _write_panels(path: Path, pictures: Sequence[Any], _: float) -> None:
     from PIL import Image
 
-    places = np.cumsum([0, *(picture.height for picture in pictures)]).tolist()
-    whole = Image.new("RGB", (PANEL_WIDTH, places[-1]), "white")
-    for picture, place in zip(pictures, places, strict=False):
-        whole.paste(picture, (0, place))
+    whole = Image.fromarray(np.concatenate([np.asarray(one) for one in pictures]))
     whole.quantize(COLOURS).save(path, "PNG", optimize=True)
 
 
 def _write_gif(path: Path, pictures: Sequence[Any], per_second: float) -> None:
-    colours = pictures[-1].quantize(GIF_COLOURS)
+    from PIL import Image
+
+    # of the first too: the last may hide the face behind a cake
+    both = np.concatenate([np.asarray(one) for one in (pictures[0], pictures[-1])])
+    colours = Image.fromarray(both).quantize(COLOURS, Image.Quantize.FASTOCTREE)
     first, *more = (one.quantize(palette=colours, dither=0) for one in _lingering(pictures))
     every: Any = {"save_all": True, "append_images": more, "loop": 0}
     first.save(path, "GIF", duration=round(1000 / per_second), **every)
@@ -229,6 +222,9 @@ THINNEST_PIPE = 0.12  # Radius of the pipe of a flux below the colours, over tha
 FLOW_COLOURS = ["#E4F4CB", "#C7E9B4", "#7FCDBB", "#41B6C4", "#1D91C0", "#225EA8", "#253494"]
 FLOW_COLOURS += ["#081D58"]
 """From the lower to the upper limit (YlGnBu of ColorBrewer)."""
+FLUX = "flux of a throat,\n% of the first flow"  # Title of these colours
+BRIGHTEST, DECADES = 99.5, 2.0
+"""Percentile of the first state's values at which they end, and how many decades they show."""
 
 
 OBLIQUE, BROADSIDE = ((-1.1, -1.9, 0.9), (1500, 950)), ((-0.55, -1.9, 0.75), (1500, 760))
@@ -242,8 +238,10 @@ def draw_pictures(work: dict[str, Any]) -> None:
     """Draw each frame of what `draw_frames` sends; the colours are the same in all of them."""
     import pyvista as pv
 
-    bounds, still, flow = np.array(work["box"]) * MM, pv.read(work["grains"]), bool(work["title"])
+    bounds, still = np.array(work["box"]) * MM, pv.read(work["grains"])
+    flow = work["frames"][0][1]  # of the first state; "" where no flow is shown
     toward, window = BROADSIDE if flow else OBLIQUE
+    limits = colour_limits(pv.read(flow).cell_data["value"]) if flow else (0.0, 0.0)
     colours = {} if flow else colours_of(pv.read(work["frames"][-1][0]), bounds)
     for number, (spheres, lines, target) in enumerate(work["frames"], 1):
         state = pv.read(spheres)
@@ -255,7 +253,7 @@ def draw_pictures(work: dict[str, Any]) -> None:
             plotter.add_mesh(_balls(still, grains, 24), **glass)
             _add_fines(plotter, state, bounds, color=FINE_COLOUR, ambient=0.25)
             radius = float(still.point_data["radius_m"].mean()) * MM
-            _add_lines(plotter, pv.read(lines), radius, work["title"], work["limits"])
+            _add_lines(plotter, pv.read(lines), radius, limits)
         else:
             own = state.n_points and np.any(state.point_data["kind"] == Kind.GRAIN)
             packed = state if own else still
@@ -265,7 +263,7 @@ def draw_pictures(work: dict[str, Any]) -> None:
                 grey = {"color": GRAIN_COLOUR, "smooth_shading": True, "ambient": 0.15}
                 plotter.add_mesh(_balls(packed, far, 32), **grey)
             _add_fines(plotter, state, bounds, **colours)
-        _add_frame(plotter, bounds, depth_only=flow)
+        _add_frame(plotter, bounds, depth_only=bool(flow))
         _look(plotter, bounds, toward)
         plotter.screenshot(target)
         plotter.close()
@@ -322,15 +320,21 @@ def _add_fines(plotter: Any, spheres: Any, bounds: Array, **style: Any) -> None:
         plotter.add_mesh(drawn, smooth_shading=True, **style)
 
 
-def _add_lines(
-    plotter: Any, mesh: Any, radius: float, title: str, limits: Sequence[float]
-) -> None:
+def colour_limits(values: Array) -> tuple[float, float]:
+    """Two decades below the largest values (N,), rounded to one digit; of values above 0."""
+    most = float(np.percentile(values[values > 0], BRIGHTEST)) if np.any(values > 0) else 1.0
+    digit = 10.0 ** np.floor(np.log10(most))
+    high = float(np.ceil(most / digit) * digit)
+    return high / 10.0**DECADES, high
+
+
+def _add_lines(plotter: Any, mesh: Any, radius: float, limits: tuple[float, float]) -> None:
     """Throats as pipes among grains of a mean `radius`, as wide as their flux."""
     mesh.points = mesh.points * MM
     if not mesh.n_points:
         return
     scale = {"scalars": "value", "log_scale": True, "clim": limits, "cmap": FLOW_COLOURS}
-    look = {"ambient": 0.35, "smooth_shading": True, "scalar_bar_args": _bar(title, labels=3)}
+    look = {"ambient": 0.35, "smooth_shading": True, "scalar_bar_args": _bar(FLUX, labels=3)}
     plotter.add_mesh(_pipes(mesh, radius, limits[1]), **scale, **look)
 
 

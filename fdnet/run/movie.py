@@ -3,7 +3,8 @@
 import shlex
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import repeat
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,87 +20,104 @@ from fdnet.network.laws.named import DAMAGE_LAWS, LAWS, damage_law
 from fdnet.network.network import Network
 from fdnet.report.picture import MovieFrame, Scene, refuse_suffix, write_movie
 from fdnet.report.vtk import refuse_without_view, write_flux_vtp, write_spheres_vtp
+from fdnet.run.by_classes import STATE
 from fdnet.run.finished import FinishedRun, open_run
-from fdnet.run.folder import ANALYSE_AGAIN, check_finished, check_one, frames_in, frames_of
+from fdnet.run.folder import ANALYSE_AGAIN, check_finished, frames_of
 from fdnet.spheres.readers import read_spheres
-from fdnet.spheres.snapshot import Array, Snapshot
-
-BRIGHTEST, DECADES = 99.5, 2.0
-"""Percentile of the first values at which the colours end, and how many decades they show."""
-FluxOf = Callable[[Snapshot, float | None], tuple[Array, float]]
-"""From the fines (none: the clean specimen) and the rate over the first (None: not known) to the
-flux (T,) of the throats in percent of the first flow, and k over that of the clean specimen."""
+from fdnet.spheres.snapshot import Array
 
 
-def flux_of(run: FinishedRun, network: Network) -> FluxOf:
-    """How the flux of each throat in the network of a run follows from the fines.
-
-    The laws are those of the run; where it measured the damage in two ways, that of the throats.
-    Where no rate is known it is the one at the first pressure drop. Fines that still move count
-    as deposit.
-    """
-    choices = run.case.analysis
-    clean = LAWS[choices.law](network)
-    first = solve_flow(network, clean)
-    names = (str(run.summary.get(f"damage_law_{which}")) for which in ("other", "used"))
-    damaged = damage_law(
-        next((name for name in names if name in DAMAGE_LAWS), SECTION_ARCHIE),
-        clogging_threshold=choices.clogging_threshold,
-        middle_band=choices.middle_band,
-    )
-
-    def flux(fines: Snapshot, rate: float | None) -> tuple[Array, float]:
-        flow = first
-        if len(fines):
-            occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
-            flow = solve_flow(network, damaged(network, occupancy, clean).conductance)
-        k = flow.inflow / first.inflow if first.inflow > 0 else 0.0
-        flux = np.abs(flow.throat_flux)
-        share = flux / flow.inflow if flow.inflow > 0 else 0.0 * flux
-        return 100.0 * share * (k if rate is None else rate), k
-
-    return flux
-
-
-def colour_limits(values: Array) -> tuple[float, float]:
-    """Two decades below the largest values (N,), rounded to one digit; of values above 0."""
-    most = float(np.percentile(values[values > 0], BRIGHTEST)) if np.any(values > 0) else 1.0
-    digit = 10.0 ** np.floor(np.log10(most))
-    high = float(np.ceil(most / digit) * digit)
-    return high / 10.0**DECADES, high
-
-
-# ---- The movie of a finished run, or a picture of it before and after, from the states it kept.
-LEAST, MOST = 0.5, 30.0  # Frames a second that a movie may have
-TITLE = "flux of a throat,\n% of the first flow"  # Of the colours
-
-
+# ---- The states of a finished run.
 class DrawnState(NamedTuple):
     """One state of a run: the file of its spheres, None before the first fine came in, and its row
-    of the history."""
+    of the history, with `rate_over_initial` where the flow followed the deposit."""
 
     spheres: Path | None
     row: Mapping[str, Any]
 
-    @property
-    def rate(self) -> float | None:
-        """Over the first; None where the flow did not follow the deposit."""
-        if self.spheres is None:
-            return 1.0 if "rate_over_initial" in self.row else None
-        return self.row.get("rate_over_initial")
-
-    def words(self, measured: float | None = None) -> str:
-        """Time, rate, permeability (else the `measured` one) and fines, as far as known."""
+    def words(self, what: str, measured: float | None = None) -> str:
+        """Time, rate, permeability (else the `measured` one) and number of `what` is drawn."""
         if self.spheres is None:
             return "clean sand"
         seconds = float(self.row.get("physical_time_s", self.row["time_s"]))
-        words = [f"{seconds:.3g} s" if seconds >= 1 else f"{1e3 * seconds:.3g} ms"]
-        if self.rate is not None:
-            words.append(f"rate {self.rate:.2f}")
-        k = self.row.get("k_over_k0", measured)
-        if k is not None:
-            words.append(f"k/k0 {k:.2f}")
-        return ",   ".join([*words, f"{int(self.row['invaded'])} fines in the sand"])
+        time = f"{seconds:.3g} s" if seconds >= 1 else f"{1e3 * seconds:.3g} ms"
+        rate, k = self.row.get("rate_over_initial"), self.row.get("k_over_k0", measured)
+        shares = [
+            f"{name} {one:.2f}" for name, one in (("rate", rate), ("k/k0", k)) if one is not None
+        ]
+        return ",   ".join([time, *shares, f"{int(self.row['invaded'])} {what}"])
+
+
+def states_of(run: FinishedRun) -> Iterator[DrawnState]:
+    """The states that the run kept, in order of time; the first is the clean specimen."""
+    if not isinstance(run.case, InvasionCase):
+        raise CaseError(f"{run.path}: has no fines, so there is no invasion to show")
+    files = frames_of(run.manifest["files"])
+    if not files:
+        raise CaseError(
+            f"{run.path / 'frames'}: holds no states that this run wrote; write them with fdnet "
+            f"run CASE.toml --out {shlex.quote(str(run.path))} --stages report --force"
+        )
+    rows: dict[int, Any] = {int(row["step"]): row for row in run.history.to_dict("records")}
+    follows = "rate_over_initial" in run.history
+    yield DrawnState(None, {"step": 0} | ({"rate_over_initial": 1.0} if follows else {}))
+    for step, name in sorted(files.items()):
+        yield DrawnState(_there(run, name), rows[step])
+
+
+def _there(run: FinishedRun, name: str) -> Path:
+    if not (path := run.path / name).is_file():
+        raise CaseError(f"{path}: is missing; {ANALYSE_AGAIN}")
+    return path
+
+
+def drawn_as(run: FinishedRun) -> str:
+    """What the spheres in the sand of a run are."""
+    if run.summary.get("method") == "both":
+        return "spheres in the sand; finer solids are not drawn"
+    several = any(row["fines_per_row"] > 1 for row in run.summary.get("classes", ()))
+    return "spheres stand for the solids in the sand" if several else "fines in the sand"
+
+
+def fluxes_of(
+    run: FinishedRun, network: Network, states: Iterable[DrawnState]
+) -> Iterator[tuple[Array, float | None]]:
+    """The flux (T,) of the throats of a run in percent of the first flow at each of its `states`.
+
+    With it k over that of the clean specimen, where it is measured for it. The fast model kept the
+    flow. Else the laws are those of the run; where it measured the damage in two ways, that of the
+    throats. Fines that still move count as deposit. Where no rate is known it is the one at the
+    first pressure drop.
+    """
+    if run.summary.get("method") == "network":
+        with np.load(run.path / "invade" / STATE) as data:
+            if "state_flux" not in data.files:
+                raise CaseError(f"{run.path}: kept no flow; run the case anew for --show flux")
+            kept = dict(zip(data["state_step"].tolist(), data["state_flux"], strict=True))
+        for one in states:
+            yield 100.0 * one.row["rate_over_initial"] * kept[one.row["step"]], None
+        return
+    choices = run.case.analysis
+    clean = LAWS[choices.law](network)
+    first = flow = solve_flow(network, clean)
+    other = run.summary.get("damage_law_other") or run.summary["damage_law_used"]
+    damaged = damage_law(
+        other if other in DAMAGE_LAWS else SECTION_ARCHIE,
+        clogging_threshold=choices.clogging_threshold,
+        middle_band=choices.middle_band,
+    )
+    for one in states:
+        if one.spheres is not None:
+            fines = read_spheres(one.spheres, box=network.box).fines()
+            occupancy = measure_occupancy(network, fines, overlap=choices.throat_overlap)
+            flow = solve_flow(network, damaged(network, occupancy, clean).conductance)
+        k = flow.inflow / max(first.inflow, 1e-300)
+        share = np.abs(flow.throat_flux) / max(flow.inflow, 1e-300)
+        yield 100.0 * share * one.row.get("rate_over_initial", k), k
+
+
+# ---- The movie, or a picture of before and after.
+LEAST, MOST = 0.5, 30.0  # Frames a second that a movie may have
 
 
 def movie_of(
@@ -126,69 +144,27 @@ def movie_of(
     run = open_run(folder)
     path = target or run.path / "invasion.gif"
     refuse_suffix(path)
-    if run.summary.get("method") == "network" and path.suffix.lower() != ".png":
-        raise CaseError(
-            f"{run.path}: the fast model keeps the end of an invasion alone, so there is no "
-            "movie; give --out FILE.png for a picture of before and after, or run the case "
-            "without --fast"
-        )
     refuse_present(path, force=force)
     refuse_without_view(str(path))
     check_finished(folder)
-    moments = list(moments_of(run))
+    states, what = list(states_of(run)), drawn_as(run)
     if path.suffix.lower() == ".png":
-        moments = [moments[0], moments[-1]]
-    still = _whole(run, "spheres_initial.vtp")
-    box = np.array([(0.0, side) for side in run.case.size_m])
-    frames, limits = [], (0.0, 0.0)
+        states = [states[0], states[-1]]
+    scene = Scene(
+        grains=_there(run, "spheres_initial.vtp"),
+        box=np.array([(0.0, side) for side in run.case.size_m]),
+        told=progress,
+    )
+    frames, network = list[MovieFrame](), run.network() if flux else None
+    fluxes = repeat((None, None)) if network is None else fluxes_of(run, network, states)
     with tempfile.TemporaryDirectory() as work:
-        none, network = run.spheres("initial").fines(), run.network() if flux else None
-        empty = write_spheres_vtp(Path(work, "none.vtp"), none)
-        fluxes = None if network is None else flux_of(run, network)
-        for number, one in enumerate(moments):
-            spheres = one.spheres or empty
-            if fluxes is None:
-                frames.append(MovieFrame(spheres, one.words()))
-                continue
-            if progress:
-                print(f"movie: flow of state {number + 1} of {len(moments)}", file=sys.stderr)
-            fines = read_spheres(spheres, box=box).fines() if one.spheres else none
-            values, k_over_k0 = fluxes(fines, one.rate)
-            limits = limits if number else colour_limits(values)
-            lines = write_flux_vtp(Path(work, f"lines_{number:04d}.vtp"), network, values)
-            frames.append(MovieFrame(spheres, one.words(k_over_k0), lines))
-        title = TITLE if flux else ""
-        scene = Scene(grains=still, box=box, title=title, limits=limits, told=progress)
+        none = write_spheres_vtp(Path(work, "none.vtp"), run.spheres("initial").fines())
+        for one, (values, k_over_k0) in zip(states, fluxes, strict=False):
+            lines = None
+            if values is not None:
+                lines = Path(work, f"lines_{len(frames):04d}.vtp")
+                write_flux_vtp(lines, network, values)
+                if progress:
+                    print(f"movie: flow of {len(frames) + 1} of {len(states)}", file=sys.stderr)
+            frames.append(MovieFrame(one.spheres or none, one.words(what, k_over_k0), lines))
         return write_movie(path, frames, scene, per_second=per_second)
-
-
-def moments_of(run: FinishedRun) -> Iterator[DrawnState]:
-    """The states that the run kept, in order of time; the first is the clean specimen."""
-    if not isinstance(run.case, InvasionCase):
-        raise CaseError(f"{run.path}: has no fines, so there is no invasion to show")
-    kept = frames_of(run.manifest["files"])
-    files = frames_in(run.path) | kept
-    if not files:
-        raise CaseError(
-            f"{run.path / 'frames'}: holds no states to draw; write them with fdnet run CASE.toml "
-            f"--out {shlex.quote(str(run.path))} --stages report --force"
-        )
-    rows: dict[int, Any] = {int(row["step"]): row for row in run.history.to_dict("records")}
-    for step, name in files.items():
-        if step not in rows or (kept and step not in kept):
-            raise CaseError(
-                f"{run.path / name}: is no state that this run wrote; move it out of this folder"
-            )
-    yield DrawnState(None, dict.fromkeys(map(str, run.history.columns), 0.0))
-    for step, name in sorted(files.items()):
-        yield DrawnState(_whole(run, name), rows[step])
-
-
-def _whole(run: FinishedRun, name: str) -> Path:
-    """A mesh of the run that is there, uncut and, where its digest was kept, unchanged."""
-    path = run.path / name
-    check_one(run.path, run.manifest, name, ANALYSE_AGAIN)
-    if not path.is_file() or not path.read_bytes().rstrip().endswith(b"</VTKFile>"):
-        what = "is cut" if path.is_file() else "is missing"
-        raise CaseError(f"{path}: {what}; {ANALYSE_AGAIN}")
-    return path

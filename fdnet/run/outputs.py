@@ -109,7 +109,7 @@ def write_paraview(results: Results) -> list[str]:
         stride, entries = -(-len(one.history) // MOST_FRAMES), []
         chosen = one.history[::-1][::stride][::-1]
         states = readable_states(path / "invade", chosen, one.case, one.scales, results.grains)
-        for row, state in [(one.history[-1], one.damaged)] if one.rows else states:
+        for row, state in one.states or states:
             name = f"frames/spheres_{row.step}.vtp"
             moving = state if one.case.grains.motion == "mobile" else state.fines()
             vtk.write_spheres_vtp(path / name, moving)

@@ -336,12 +336,12 @@ def with_finer(results: outputs.Results, supplied: int) -> outputs.Results:
     case, last = one.case, one.history[-1]
     model = class_model(case, one.scales, grains, network=results.analysis.network)
     kept = read_classes(results.path / "invade" / finer_file(last.step), one.updates[-1])
-    counts = model.counted(kept.by_class[-1])
-    fines = spheres_at_the_end(case, model, kept, counts)
+    counts = model.counted(kept.by_class)
+    fines = spheres_at_the_end(case, model, kept)
     numbers = class_summary(case, model, kept) | {
-        "supplied_count": supplied + int(counts.supplied.sum()),
-        "passed_count": last.passed + int(counts.passed.sum()),
-        "upstream_count": last.upstream + int(counts.upstream.sum()),
+        "supplied_count": supplied + int(counts.rows[-1].sum()),
+        "passed_count": last.passed + counts.history[-1].passed,
+        "upstream_count": last.upstream + counts.history[-1].upstream,
     }
     everyone = one.damaged.joined(fines)
     analysis = analysed_classes(model, kept, results.analysis, everyone)

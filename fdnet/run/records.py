@@ -237,8 +237,9 @@ class FinishedInvasion:
     damaged: Snapshot  # grains and all remaining fines at the end
     # the record of a coupled invasion, one row an update; empty of others
     updates: tuple[Mapping[str, float], ...] = ()
-    # of history.csv, where the fast model made it; empty of others
+    # of history.csv, and the fines at some of its steps, where the fast model made them
     rows: tuple[dict[str, float], ...] = ()
+    states: tuple[tuple[Checkpoint, Snapshot], ...] = ()
 
 
 # ---- One session of a run: what is run, where, and how long each stage took.

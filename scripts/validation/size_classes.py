@@ -53,13 +53,13 @@ def both(run: FinishedRun) -> dict[str, Any]:
     model = class_model(case, invasion_scales(case), run.spheres("initial"))
     end = invade_classes(model.sieve, model.classes, model.course, model.flow)
     seconds = time.process_time() - start
-    counts = model.counted(end.by_class[-1])
-    x = spheres_at_the_end(case, model, end, counts).position[:, 0]
+    counts = model.counted(end.by_class)
+    x = spheres_at_the_end(case, model, end).position[:, 0]
     edges = np.array([0.0, min(FIRST, case.size_m[0])])
     clean, flow = (model.flow(one, None).flow for one in (np.ones_like(end.kept), end.kept))
     intact = inplace_permeability(model.network, clean, edges, model.sieve.halves)
     damaged = inplace_permeability(model.network, flow, edges, model.sieve.halves / end.kept)
-    passed, number = int(counts.passed.sum()), int(counts.invaded.sum())
+    passed, number = counts.history[-1].passed, counts.history[-1].invaded
     fast = (
         float(damaged[0] / intact[0]),
         end.rows[-1]["k_over_k0"],

@@ -75,6 +75,14 @@ def _lives(number: int) -> bool:
         return False
 
 
+def by_hand(out: Path, *more: str) -> str:
+    """What Snakemake says, called with the Snakefile in the folder of a plan."""
+    call = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--cores", "2", *more]
+    done = subprocess.run(call, cwd=out, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
 @pytest.mark.liggghts
 @needs_snakemake
 def test_one_call_of_snakemake_ends_by_itself_with_its_page(tmp_path, capsys):
@@ -91,10 +99,8 @@ def test_one_call_of_snakemake_ends_by_itself_with_its_page(tmp_path, capsys):
     assert main(words(tmp_path, "snakemake")) == 0
     assert "to do" not in capsys.readouterr().err
     page = (out / "compare.html").read_bytes()
-    (out / "compare.html").unlink()
-    by_hand = [sys.executable, "-m", "snakemake", "--snakefile", SNAKEFILE, "--cores", "2"]
-    done = subprocess.run(by_hand, cwd=out, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    (out / "compare.html").write_text("of another day")
+    by_hand(out)
     assert (out / "compare.html").read_bytes() == page
     assert {p: p.stat().st_mtime_ns for p in out.glob("runs/*/manifest.json")} == before
 
@@ -138,10 +144,17 @@ def test_a_snakemake_that_outlives_fdnet_is_named_and_no_seed_has_failed(tmp_pat
 
 @needs_snakemake
 def test_the_lock_of_another_snakemake_is_respected(tmp_path, capsys):
-    """One that fdnet did not start: its lock stands without a word in the lock of fdnet."""
+    """One that fdnet did not start: its lock stands without a word in the lock of fdnet.
+
+    By hand it does the runs of a plan, also where there is a page of nothing; they have the
+    resource that keeps the executor for Slurm from a call of srun.
+    """
     assert main([*words(tmp_path, "snakemake"), "--gather"]) == 5
+    said = by_hand(tmp_path / "out", "--dry-run")
+    assert re.search(r"run +2\n", said)
+    assert len(re.findall(r"cpus_per_task=1, mpi=, nodes=1$", said, re.MULTILINE)) == 2
     locks = tmp_path / "out/.snakemake/locks"
-    locks.mkdir(parents=True)
+    locks.mkdir(parents=True, exist_ok=True)
     (locks / "0.output.lock").write_text("runs/tiny-seed-1/manifest.json\n")
     capsys.readouterr()
     fake = fake_liggghts(tmp_path / "lmp", "exit 1")
@@ -154,11 +167,14 @@ def test_the_lock_of_another_snakemake_is_respected(tmp_path, capsys):
 @pytest.mark.nightly
 @needs_snakemake
 def test_resources_reach_sbatch_as_they_are_and_its_reason_the_user(tmp_path, capsys, monkeypatch):
-    """A stand-in for sbatch keeps its words and refuses; nothing that a user names is run."""
+    """A stand-in for sbatch keeps its words and refuses; nothing that a user names is run.
+
+    fdnet is itself in a job of Slurm, and keeps the variable that names Slurm's configuration.
+    """
     pytest.importorskip("snakemake_executor_plugin_slurm")
     (tmp_path / "bin").mkdir()
     (tmp_path / "bin/sbatch").write_text(
-        f"#!/bin/bash\nprintf '%s\\n' \"$@\" >> {tmp_path}/words\n"
+        f'#!/bin/bash\nprintf \'%s\\n\' "conf: $SLURM_CONF" "$@" >> {tmp_path}/words\n'
         "echo 'sbatch: error: invalid partition specified' >&2; exit 1\n"
     )
     for name in ("sacct", "squeue", "scontrol", "sinfo", "sacctmgr"):
@@ -166,6 +182,8 @@ def test_resources_reach_sbatch_as_they_are_and_its_reason_the_user(tmp_path, ca
     for program in (tmp_path / "bin").iterdir():
         program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}/bin:{os.environ['PATH']}")
+    monkeypatch.setenv("SLURM_JOB_ID", "1")
+    monkeypatch.setenv("SLURM_CONF", "of this cluster")
     fake = fake_liggghts(tmp_path / "lmp", "exit 1")
     resources = "slurm_partition=all,runtime=10,mem_mb=500"
     arguments = words(tmp_path, "auto", "--liggghts", fake, "--slurm", resources)
@@ -173,6 +191,7 @@ def test_resources_reach_sbatch_as_they_are_and_its_reason_the_user(tmp_path, ca
     error = capsys.readouterr().err
     assert "sbatch: error: invalid partition specified" in error
     given = (tmp_path / "words").read_text()
+    assert given.startswith("conf: of this cluster\n")
     assert re.search(r"-p\s+all\b", given)
     assert re.search(r"--mem\s+500\b", given)
 

@@ -9,7 +9,8 @@ import tomli_w
 from builders import TINY, answer, naming, tiny
 from campaign.samples import finished_run
 
-from fdnet import read_case
+import fdnet
+from fdnet import CaseError, read_case
 from fdnet.campaign.plan import sweep_plan
 from fdnet.cli import main
 from fdnet.run.pipeline import refusals
@@ -111,6 +112,8 @@ def test_bad_sweeps_are_refused_with_the_key(write, capsys):
         path = write(text)
         code, _, error = answer(capsys, "sweep", path, "--out", path.parent / "out")
         assert (code, bool(re.search(message, error))) == (2, True), (text, error)
+        with pytest.raises(CaseError, match=message):
+            fdnet.sweep(path, out=path.parent / "out")
     assert not (path.parent / "out").exists()
 
 
@@ -168,7 +171,10 @@ def designed(write, losses: dict[str, list[float]], targets: str, capsys, **more
     capsys.readouterr()
     assert main(arguments) == 0
     lines = capsys.readouterr().out.splitlines()
-    return json.loads((out / "summary.json").read_text()) | {"lines": lines}
+    made = json.loads((out / "summary.json").read_text()) | {"lines": lines}
+    in_python = [one[:2] for one in fdnet.sweep(path, out=out).candidates]
+    assert in_python == [(mud["name"], mud["state"]) for mud in made["candidates"]]
+    return made
 
 
 def test_muds_are_ranked_by_their_bands(write, capsys):

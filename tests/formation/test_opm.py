@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from fdnet.formation.model import cake_skin
+from fdnet.formation.model import CAKE_SKINS
 
 pytest.importorskip("opm.simulators", reason="needs the wheels opm and opm-simulators")
 
@@ -125,5 +125,5 @@ def test_the_skin_of_a_cake_is_that_of_opm_flow(shape, tmp_path):
     solids, skin = np.array(rows, float)
     thick = solids / (1.0 * (1 - 0.4))
     assert thick[-1] > 0.02
-    expected = [1000 / 10 * cake_skin(shape, one, 0.1) for one in thick]
+    expected = [1000 / 10 * CAKE_SKINS[shape](one / 0.1) for one in thick]
     assert skin == pytest.approx(expected, rel=1e-5)

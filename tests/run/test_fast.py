@@ -1,19 +1,35 @@
 """A run by the fast model: the same folder as with LIGGGHTS, from the same pack."""
 
 import shutil
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from builders import tiny
 
+from fdnet import build_network, solve_flow
 from fdnet.classes.invasion import cake_permeability
+from fdnet.cli import main
 from fdnet.errors import CaseError, FlowError
-from fdnet.run import by_classes
-from fdnet.run.by_classes import all_is_cake, class_model
+from fdnet.report.picture import PNG_START
+from fdnet.run import by_classes, movie
+from fdnet.run.by_classes import (
+    MOST_STATES,
+    STATE,
+    all_is_cake,
+    class_model,
+    finished_classes,
+    read_classes,
+    states_on_the_way,
+    watch,
+)
 from fdnet.run.finished import open_run
-from fdnet.run.movie import moments_of, movie_of
+from fdnet.run.movie import fluxes_of, states_of
 from fdnet.run.pipeline import run_case
 from fdnet.scales.scales import invasion_scales
+from fdnet.spheres.readers import read_spheres
 
 FAST = ("invasion.method=network", "box.sides=periodic", "drag={}", "run={}")
 FAST += ("fines.supply=batches", "cake.api_filtrate_mL=5.0")
@@ -67,13 +83,77 @@ def test_a_killed_run_goes_on_from_the_pack_to_the_same_bits(fast, tmp_path):
     assert open_run(again).summary["k_damaged_m2"] == fast.summary["k_damaged_m2"]
 
 
-def test_it_draws_a_picture_of_before_and_after_and_refuses_a_movie(fast, tmp_path):
-    with pytest.raises(CaseError, match=r"the end of an invasion alone.*--out FILE\.png"):
-        movie_of(fast.path, tmp_path / "movie.gif")
-    before, after = moments_of(fast)
-    assert before.spheres is None
-    assert after.row["invaded"] == fast.summary["invaded_count"]
-    assert after.spheres.is_file()
+def test_a_movie_shows_the_solids_that_the_history_counts(fast, tmp_path, monkeypatch):
+    """In every state, and none moves; the last is the end of the run."""
+    clean, *states = states_of(fast)
+    assert clean.spheres is None
+    assert len(states) == min(len(fast.history) - 1, MOST_STATES)
+    seen = {}
+    for one in states:
+        fines = read_spheres(one.spheres, box=[(0.0, side) for side in fast.case.size_m])
+        x = fines.position[:, 0]
+        inside = (x >= 0) & (x < fast.case.size_m[0])
+        assert int(inside.sum()) == one.row["invaded_count"]
+        assert int((x < 0).sum()) == one.row["upstream_count"]
+        for number, place in zip(fines.id.tolist(), fines.position.tolist(), strict=True):
+            assert seen.setdefault(number, place) == place
+    end = fast.spheres().fines()
+    assert np.array_equal(fines.position, end.position)
+    assert np.array_equal(fines.radius, end.radius)
+    drawn = []
+    monkeypatch.setattr(movie, "write_movie", lambda path, frames, *_, **__: drawn.extend(frames))
+    movie.movie_of(fast.path, tmp_path / "m.gif", flux=True)
+    assert [one.spheres for one in drawn[1:]] == [one.spheres for one in states]
+    last = fast.history.iloc[-1]
+    words = f"k/k0 {last.k_over_k0:.2f},   {int(last.invaded_count)} fines in the sand"
+    assert drawn[-1].words.endswith(words)
+
+
+def test_the_flux_of_a_movie_is_that_of_the_run(fast, tmp_path):
+    table, states = fast.throats, list(states_of(fast))
+    network = build_network(fast.spheres("initial"), periodic=fast.case.periodic)
+    first, *_, last = (one for one, _ in fluxes_of(fast, network, states))
+    rate = fast.history.rate_over_initial.iloc[-1]
+    for values, name, share in ((first, "initial", 1.0), (last, "damaged", rate)):
+        flow = solve_flow(network, table[f"conductance_{name}_m3"].to_numpy())
+        expected = 100.0 * share * np.abs(flow.throat_flux) / flow.inflow
+        assert values == pytest.approx(expected, rel=1e-4, abs=1e-5)
+    target = tmp_path / "before_and_after.png"
+    assert main(["movie", str(fast.path), "--show", "flux", "--out", str(target)]) == 0
+    assert target.read_bytes().startswith(PNG_START)
+
+
+def test_a_fast_run_of_an_earlier_version_has_its_end_to_show_and_no_flow(fast, tmp_path):
+    old = Path(shutil.copytree(fast.path, tmp_path / "old"))
+    with np.load(old / "invade" / STATE) as data:
+        kept = {name: data[name] for name in data.files if not name.startswith("state_")}
+    np.savez_compressed(old / "invade" / STATE, **kept)
+    done, *_ = finished_classes(
+        fast.case, invasion_scales(fast.case), fast.spheres("initial"), old / "invade"
+    )
+    ((row, fines),) = done.states
+    assert row.step == len(fast.history) - 1
+    assert len(fines) == len(fast.spheres().fines())
+    with pytest.raises(CaseError, match="kept no flow; run the case anew for --show flux"):
+        next(fluxes_of(open_run(old), fast.network(), []))
+
+
+def test_states_on_the_way_are_even_and_what_was_washed_out_is_drawn(fast):
+    model = class_model(fast.case, invasion_scales(fast.case), fast.spheres("initial"))
+    kept, seen = read_classes(fast.path / "invade" / STATE), {}
+    flow = SimpleNamespace(throat_flux=np.array([-1.0, 3.0]), inflow=2.0)
+    for step in range(150):
+        watch(seen, step, kept.solids, flow)
+    assert list(seen) == [*range(0, 150, 8), 149]
+    assert seen[149]["flux"].tolist() == [0.5, 1.5]
+    by_class = np.repeat(kept.by_class[-1:], 150, axis=0)
+    by_class[8, 0, 0] += 5 * model.classes.volume[0]
+    kept = replace(kept, by_class=by_class, rows=kept.rows[-1:] * 150)
+    end, held = fast.spheres().fines(), {step: one["held"] for step, one in seen.items()}
+    states = [one for _, one in states_on_the_way(fast.case, model, kept, held)]
+    assert [len(one) - len(end) for one in states] == [0, 5, *[0] * (len(seen) - 2)]
+    x = states[1].position[len(end) :, 0]
+    assert ((x >= 0) & (x < fast.case.size_m[0])).all()
 
 
 def test_a_class_above_every_throat_is_said_to_be_cake(fast):
