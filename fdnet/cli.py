@@ -25,11 +25,6 @@ COMMANDS = (
     formation.add_formation,
 )
 """What adds commands to the parser, in the order that `fdnet --help` shows."""
-FORMER = {
-    "cases": "fdnet init --list, and fdnet init --from CASE",
-    "design": "fdnet sweep, which takes the same file",
-}
-"""What took the place of commands that are gone."""
 
 _STOPPED = 130
 _SIGNALS: list[int] = []  # Signals to stop that have arrived
@@ -121,8 +116,6 @@ def _parsed(given: Sequence[str]) -> argparse.Namespace:
     parser = _parser()
     known = commands_of(parser)
     name = next((one for one in given if not one.startswith("-")), None)
-    if name in FORMER:
-        parser.exit(2, f"fdnet: {name} is gone; use {FORMER[name]}\n")
     if name is not None and name not in known:
         near = f"; did you mean run {name}?" if name.endswith(".toml") else meant(name, known)
         parser.error(f"{name}: is no command{near}")
@@ -137,7 +130,7 @@ def _parser() -> Parser:
         prog="fdnet",
         description="What do the fines of a drilling mud cost the permeability of a sand?",
         epilog="example:\n  fdnet init --from quick && fdnet run quick.toml\n\n"
-        "fdnet COMMAND --help explains a command.",
+        "fdnet COMMAND --help explains a command. Pages named as docs/... are the project's.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.set_defaults(action=_say, parser=parser)

@@ -55,6 +55,13 @@ def explanation(name: str) -> str:
     return ""
 
 
+def test_a_case_shows_its_keys_and_what_was_given():
+    assert "(*, name, seed=1, box, grains, fluid=Fluid()" in str(inspect.signature(fdnet.Case))
+    given = repr(tiny("fluid={viscosity_cP=7.0}"))
+    assert "fluid=Fluid(viscosity_cP=7.0)" in given
+    assert "gravity" not in given
+
+
 def lattice() -> fdnet.Snapshot:
     """27 touching spheres of 1 mm."""
     place = 1e-3 * (np.indices((3, 3, 3)).reshape(3, -1).T + 0.5)

@@ -15,13 +15,16 @@ from fdnet.case.file import case_from
 from fdnet.case.tables import AnalysisChoices
 from fdnet.cli import main
 from fdnet.run.pipeline import with_default_laws
-from fdnet.scales.check import PERIODIC, WALLS, WIDTHS, checked, width_error
+from fdnet.scales.check import PERIODIC, WALLS, WIDTHS, Finding, checked, width_error
 from fdnet.scales.scales import scales_of
 
 
+def found(case: fdnet.Case) -> tuple[Finding, ...]:
+    return checked(case, scales_of(case)).findings
+
+
 def keys(*assignments: str) -> set[str]:
-    case = tiny(*assignments)
-    return {one.key for one in checked(case, scales_of(case)).findings}
+    return {one.key for one in found(tiny(*assignments))}
 
 
 WELL = ("well.radius_mm=108", "well.drainage_radius_m=100")
@@ -32,13 +35,25 @@ SOUND = (*WELL, *BULKY, "fines.count=3000")
 def test_what_is_odd_is_named_and_nothing_else():
     for odd, key in [
         (("box.size_mm=[3.0,1.6,1.6]", "grains.count=66"), "box.size_mm"),
+        (("box.size_mm=[1.4,3.0,3.0]", "grains.count=116", "analysis.sections=1"), "box.size_mm"),
         (("analysis.sections=7",), "analysis.sections"),
         (("fines.count=100",), "fines.count"),
         (("run.cap_ms=2.0",), "run.cap_ms"),
         (("fines.radius_mm=0.12", "fines.count=400"), "fines.radius_mm"),
+        (("grains={radius_mm=0.4, porosity=0.38}",), "grains.porosity"),
     ]:
         assert key not in keys(*SOUND)
         assert key in keys(*SOUND, *odd)
+
+
+def test_one_trouble_is_said_once(root):
+    """Without [well], and with a pack that its grains overlap too much for, as it was made."""
+    assert sum(" of a well " in one.what for one in found(tiny(*BULKY))) == 1
+    for porosity, overlap, refused in ((0.25, "14 %", False), (0.2, "21 %", True)):
+        given = [f"grains.porosity={porosity}"]
+        (one,) = found(fdnet.read_case(root / "cases" / "quick.toml", assignments=given))
+        assert f"overlap by up to some {overlap} of a diameter" in one.what
+        assert ("will be refused" in one.what) == refused
 
 
 def test_a_velocity_of_no_well_and_a_finest_tenth_that_takes_the_time_are_named():
@@ -50,8 +65,7 @@ def test_a_velocity_of_no_well_and_a_finest_tenth_that_takes_the_time_are_named(
         del tables["fines"][key]
     sizes = {"D10_mm": 0.01, "D50_mm": 0.04, "D90_mm": 0.1}
     tables["fines"] |= {"sizes": sizes, "slab_mm": 3.0}
-    case = case_from(tables)
-    assert "fines.cut_um" in {one.key for one in checked(case, scales_of(case)).findings}
+    assert "fines.cut_um" in {one.key for one in found(case_from(tables))}
 
 
 def test_the_errors_by_width_are_those_of_the_study(root):
@@ -109,19 +123,10 @@ def test_check_refuses_what_run_refuses(tmp_path, capsys):
         assert (code, refused in error, out.exists()) == (2, True, False), error
 
 
-def test_a_specimen_that_the_damage_can_cross_is_named(root):
-    """Sauter's mean of the grains of the quick case is 0.498 mm: 1.49 mm are 3 of them."""
-    for side, named in (("1.4 mm", True), ("1.6 mm", False)):
-        given = [f"box.size=['{side}', '2.5 mm', '2.5 mm']", "analysis.sections=1"]
-        case = fdnet.read_case(root / "cases" / "quick.toml", assignments=given)
-        said = [one.what for one in checked(case, scales_of(case)).findings]
-        assert any("mean grains long" in one for one in said) == named, side
-
-
 def test_what_check_finds_stands_in_summary_and_report(finished):
     """The tiny run is 3.2 grains wide: the study of widths has some 30 % for it."""
     case = fdnet.read_case(finished.path / "case.toml")
-    odd = [one.sentence for one in checked(case, scales_of(case)).findings]
+    odd = [one.sentence for one in found(case)]
     assert odd[0].startswith("box.size_mm: the specimen is 3.2 mean grains wide")
     assert set(odd) <= set(finished.summary["warnings"])
     report = (finished.path / "report.html").read_text(encoding="utf-8")
@@ -192,6 +197,6 @@ def test_nine_lines_and_the_shipped_cases_have_nothing_odd(root, tmp_path):
     for path in (tmp_path / "nine.toml", *(root / "cases" / f"{name}.toml" for name in names)):
         case = fdnet.read_case(path)
         with naming(path):
-            assert checked(case, scales_of(case)).findings == ()
+            assert found(case) == ()
             assert case.drag.coupled
             assert case.fines.endless or path.stem == "growing-cake"

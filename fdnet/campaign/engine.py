@@ -93,7 +93,7 @@ def run_missing(path: Path, plan: Plan, how: HowToRun, lock: int) -> None:
     if not tasks:
         return
     missing = sum(task.makes.endswith(MANIFEST) for task in tasks)
-    how.say(f"{len(plan.jobs)} runs, {missing} of them to do")
+    how.say(f"{len(plan.jobs)} runs: {missing} to do, after {len(tasks) - missing} packs")
     for task in tasks:
         _log(path, task.name).unlink(missing_ok=True)
     numbers = itertools.count(1)

@@ -357,12 +357,12 @@ def _of_the_spheres(known: Known) -> Iterator[str]:
                 f"fines.solids_kg_m3: {fines.solids_kg_m3} with fines.concentration: "
                 f"{fines.concentration}, give exactly one of the two"
             )
-        elif fines.solids_kg_m3 is not None and fines.volume_fraction > tables.MAX_CONCENTRATION:
-            most = tables.MAX_CONCENTRATION
+        elif fines.volume_fraction > (most := tables.MAX_CONCENTRATION):
             yield (
-                f"fines.solids_kg_m3: {fines.solids_kg_m3:g} is {100 * fines.volume_fraction:.3g} "
-                f"% by volume; expected at most {most * fines.solids_density_kg_m3:.3g} "
-                f"({100 * most:.0f} %: more do not fit at random places)"
+                f"{concentration_text(fines)} is {100 * fines.volume_fraction:.3g} % of the mud's "
+                f"volume, expected at most {100 * most:.0f} % "
+                f"({most * fines.solids_density_kg_m3:.3g} kg/m3), because more do not fit at "
+                "random places; a mass of solids goes to fines.solids, in kg/m3 or lb/bbl"
             )
     names = [one.name for one in known.value("fines.materials") or ()]
     for twice in {name for name in names if names.count(name) > 1}:

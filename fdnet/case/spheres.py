@@ -13,16 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from fdnet.case.tables import (
-    MAX_CONCENTRATION,
-    Fraction,
-    InSI,
-    NonNegative,
-    Part,
-    Positive,
-    Radius,
-    as_tuple,
-)
+from fdnet.case.tables import Fraction, InSI, NonNegative, Part, Positive, Radius, as_tuple
 from fdnet.sizes import (
     NUMBER,
     SURFACE,
@@ -364,8 +355,8 @@ class Fines(Spheres):
     cut_um: Positive | None = None
     """Diameter of measured sizes below which solids are no spheres: they are size classes with
     invasion.method = "both", else left out, which a warning names."""
-    concentration: Annotated[float, Field(ge=1e-9, le=MAX_CONCENTRATION)] | None = 0.10
-    """Volume of solids over that of the mud."""
+    concentration: Annotated[float, Field(ge=1e-9, le=1)] | None = 0.10
+    """Volume of solids over that of the mud, at most 0.3: more do not fit at random places."""
     solids_kg_m3: Positive | None = None
     """Mass of solids over volume of mud, instead of `concentration`."""
     count: Annotated[int, Field(ge=1)] | None = None

@@ -5,7 +5,7 @@ The keys carry the unit of the user; properties give the same values in SI for e
 
 import inspect
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypedDict, TypeVar
 
 import numpy as np
@@ -72,6 +72,18 @@ class Part(BaseModel):
     """A table of the case file: frozen, no unknown keys, no conversion of text to numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
+        """The keys that were given; the others have their defaults."""
+        given = self.model_fields_set
+        return ((key, value) for key, value in super().__repr_args__() if key in given)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """A signature of keys and defaults; the types stand in the reference."""
+        keys = cls.__signature__.parameters.values()
+        plain = [one.replace(annotation=inspect.Parameter.empty) for one in keys]
+        cls.__signature__ = inspect.Signature(plain)
 
 
 def still_there(name: Any, removed: Mapping[str, str]) -> Any:

@@ -9,7 +9,8 @@ the spheres leave of it,
 
 with the resistance r of the side by the fast model. A throat to which the spheres leave the share
 s of its conductance lets pass what is narrower than s^(1/4) of its passage, since the conductance
-of an opening goes with the fourth power of its width. Spheres move through what the classes left.
+of an opening goes with the fourth power of its width. Spheres and classes share the room of a
+pore: where both together fill it, by the fast model, spheres stay in it, and before it.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -21,12 +22,14 @@ import numpy as np
 from fdnet.case.case import InvasionCase
 from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient, mud_classes
 from fdnet.classes.deposit import (
+    NONE,
     Deposits,
     Release,
     Sieve,
     advanced,
     holding,
     kept_shares,
+    loads_of,
     no_solids,
     released,
     sieve_of,
@@ -81,6 +84,7 @@ class FinerClasses:
     network: Network  # of the grains, with pores in N groups and throats (T)
     sieve: Sieve  # the same as solids meet it
     classes: SizeClasses  # (C) and, as the last one, the spheres
+    own: SizeClasses  # (C) without them
     bed: Bed  # grains and fluid, for what sticks to them
     sticking: float  # share of the contacts with grains that stick
     release: Release | None  # what the flow lifts; None: nothing
@@ -90,6 +94,7 @@ class FinerClasses:
     kept: Array  # (T, 2) share that the classes leave of what the spheres leave
     flux: Array  # (T,) m3, of the last solve
     pressure: Array  # (N,) of the last solve
+    full: Array  # (N,) whether spheres and classes fill the pore, by the last update
     solved: float = 0.0  # m3 of them that the last solve knew
 
     def among(self, passed: Passed, spheres: Stands) -> Narrowed:
@@ -116,16 +121,15 @@ class FinerClasses:
             self.solids = Deposits(
                 **{one.name: getattr(after, one.name)[..., :-1] for one in fields(Deposits)}
             )
-        alone = replace(self.solids, **{name: 0.0 * getattr(self.solids, name) for name in HELD})
-        left = [
-            kept_shares(self.sieve, self._among(one, spheres), self.classes)
-            for one in (self.solids, alone)
-        ]
+        nothing = no_solids(self.sieve, self.own)
+        both, alone = (self._among(one, spheres) for one in (self.solids, nothing))
+        left, without = (kept_shares(self.sieve, one, self.classes) for one in (both, alone))
         # loosely packed spheres among fine solids may seem to make room: they make none
-        self.kept = np.minimum(left[0] / left[1], 1.0)
-        held, rest = self._held, self.solids.in_pores + self.solids.attached
-        grown = held - self.solved > CHANGED * held
-        return Narrowed(spheres.factor * self.kept, rest.sum(axis=1), grown)
+        self.kept = np.minimum(left / without, 1.0)
+        held, rest = self._held, (self.solids.in_pores + self.solids.attached).sum(axis=1)
+        filled = loads_of(self.sieve, both, self.classes).filled
+        self.full = (filled >= 1.0) & (rest > NONE * self.sieve.void)
+        return Narrowed(spheres.factor * self.kept, rest, held - self.solved > CHANGED * held)
 
     def _among(self, solids: Deposits, spheres: Stands) -> Deposits:
         """The solids with the standing spheres as the last class."""
@@ -143,7 +147,9 @@ class FinerClasses:
 
     @property
     def _held(self) -> float:
-        return float(sum(getattr(self.solids, name).sum() for name in HELD))
+        """m3 of them that rest in the specimen."""
+        parts = (self.solids.in_pores, self.solids.attached, self.solids.in_throats)
+        return float(sum(one.sum() for one in parts))
 
     def solve(self, flow: Flow) -> None:
         """Take the `flow` of the last solve."""
@@ -152,12 +158,6 @@ class FinerClasses:
         first = np.unique(self.network.pore_group, return_index=True)[1]
         self.flux, self.pressure = flow.throat_flux, flow.pore_pressure[first]
         self.solved = self._held
-
-    @property
-    def own(self) -> SizeClasses:
-        """The classes (C) without the spheres."""
-        names = [one.name for one in fields(SizeClasses)]
-        return SizeClasses(**{name: getattr(self.classes, name)[:-1] for name in names})
 
     @property
     def resistance(self) -> float:
@@ -196,9 +196,6 @@ class FinerClasses:
         self.kept = np.ones(self.sieve.ends.shape)
 
 
-HELD = ("in_pores", "attached", "in_throats")  # The solids at rest in the specimen
-
-
 def finer_classes(
     case: InvasionCase, scales: InvasionScales, network: Network, halves: Array, flow: Flow
 ) -> FinerClasses | None:
@@ -225,6 +222,7 @@ def finer_classes(
         network=network,
         sieve=sieve,
         classes=SizeClasses(**classes),
+        own=finer,
         bed=bed_of(case, scales, scales.darcy_velocity),
         sticking=choices.sticking,
         release=release_of(case),
@@ -234,6 +232,7 @@ def finer_classes(
         kept=np.ones(sieve.ends.shape),
         flux=np.zeros(0),
         pressure=np.zeros(0),
+        full=np.zeros(len(sieve.void), bool),
     )
     made.solve(flow)
     return made

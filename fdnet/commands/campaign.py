@@ -26,8 +26,7 @@ _ENGINE = (
 )
 _DRY = (
     "--dry-run",
-    "run and write nothing; print how long the runs take, what they leave out, and what would "
-    "start them",
+    "write nothing; print the time of the runs, what they leave out, what would start them",
 )
 
 
@@ -125,10 +124,7 @@ def add_campaign_commands(commands: Any) -> None:
     about = "compare finished runs, with 95 % bands over seeds"
     example = "fdnet compare runs/thin runs/thick --out runs/compared"
     parser = new_command(commands, "compare", _run_compare, about, example)
-    folders = (
-        "run folders; the folder of an ensemble or a sweep stands for all its runs, and its own "
-        "results are written anew where it is --out too"
-    )
+    folders = "run folders; the folder of an ensemble or a sweep stands for all its runs"
     parser.add(THE_CASE, "runs RUN", folders, path_option, nargs="+")
     parser.share("--out", "--rank-by", "--json")
 
@@ -136,8 +132,6 @@ def add_campaign_commands(commands: Any) -> None:
 def _run_ensemble(options: argparse.Namespace) -> int:
     from fdnet.campaign.plan import ensemble_plan
 
-    if options.fast:
-        options.set = [*options.set, 'invasion.method="network"']
     plan = ensemble_plan(case_of(options), options.seeds, **_plan_options(options))
     return _run_campaign(options, plan)
 

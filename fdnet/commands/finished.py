@@ -27,10 +27,7 @@ def add_commands_on_runs(commands: Any) -> None:
     what = "the fines alone (default), or with them the flux of every throat"
     movie.add(THE_PICTURE, "--show", what, default="fines", choices=("fines", "flux"))
     movie.add(THE_PICTURE, "--fps N", "frames a second (default 4)", float, 4.0)
-    file = (
-        "the movie, .gif or .mp4 (default RUN/invasion.gif), or one picture of before and after, "
-        ".png"
-    )
+    file = "the movie, .gif or .mp4 (default RUN/invasion.gif), or a .png of before and after"
     movie.add(OUTPUT, "--out FILE", file, path_option)
     movie.share("--force", "--quiet")
 

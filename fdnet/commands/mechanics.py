@@ -19,8 +19,7 @@ def add_mechanics(commands: Any) -> None:
     parser.add(THE_CASE, "source CASE.toml", "the case file, or a run folder", path_option)
     parser.share("--seed", "--set", "--liggghts")
     confining = (
-        "confining stress of the triaxial test, and the pressure that sets the stiffness of Hertz "
-        "contacts"
+        "stress on the sides in the triaxial test; sets the stiffness of Hertz contacts too"
     )
     parser.add(THE_TEST, "--confining-MPa MPA", confining, float)
     triaxial = "compress the pack along x with the confining stress on its sides, until --strain"

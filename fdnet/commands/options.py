@@ -84,9 +84,10 @@ def meant(word: str, known: Iterable[str]) -> str:
 
 
 def overrides_of(options: argparse.Namespace) -> list[str]:
-    """The assignments of --set, then that of --seed."""
+    """The assignments of --set, then those of --seed and --fast."""
     seed = [] if options.seed is None else [f"seed={options.seed}"]
-    return [*options.set, *seed]
+    fast = ['invasion.method="network"'] if getattr(options, "fast", False) else []
+    return [*options.set, *seed, *fast]
 
 
 def case_of(options: argparse.Namespace) -> Any:
@@ -121,10 +122,7 @@ _ROWS: tuple[tuple[Any, ...], ...] = (
         "overrides a key of the case, e.g. fines.count=500; may be given again",
         *(str, [], {"action": "append"}),
     ),
-    (
-        *(THE_CASE, "--fast"),
-        "the fast model: size classes on the pore network instead of spheres in LIGGGHTS",
-    ),
+    (THE_CASE, "--fast", "size classes on the pore network instead of spheres in LIGGGHTS"),
     (
         *(LIGGGHTS, "--np N"),
         "MPI ranks for invasion and clean-up (default 1); packing takes one, and a cut invasion "
@@ -137,11 +135,7 @@ _ROWS: tuple[tuple[Any, ...], ...] = (
         "how several MPI ranks are started, with {ranks} for their number, e.g. "
         "'srun -n {ranks}' (default: the mpirun of LIGGGHTS)",
     ),
-    (
-        *(LIGGGHTS, "--timeout SECONDS"),
-        "stop LIGGGHTS after this time in a stage (continue with --resume)",
-        float,
-    ),
+    (LIGGGHTS, "--timeout SECONDS", "stop LIGGGHTS then in a stage; --resume continues it", float),
     (
         *(OUTPUT, "--stages STAGES"),
         f"some of {','.join(STAGES)} (default: all that the case has; without report nothing is "

@@ -257,19 +257,13 @@ def _assumptions(
 def _row(result: "Analysis") -> dict[str, Any]:
     from fdnet.report.tables import section_rows
 
-    return {
+    laws = ("law", "damage_law", "damage_law_used", "damage_law_other")
+    same = ("k_reduction", "porosity_initial", "porosity_damaged", "solver", *laws)
+    return {name: getattr(result, name) for name in same} | {
         "k_initial_m2": result.k_initial,
         "k_damaged_m2": result.k_damaged,
-        "k_reduction": result.k_reduction,
-        "porosity_initial": result.porosity_initial,
-        "porosity_damaged": result.porosity_damaged,
         "pores": len(result.network.pore_radius),
         "throats": len(result.network.throat_radius),
-        "solver": result.solver,
-        "law": result.law,
-        "damage_law": result.damage_law,
-        "damage_law_used": result.damage_law_used,
-        "damage_law_other": result.damage_law_other,
         "k_damaged_other_m2": result.k_damaged_other,
         "sections": section_rows(result),
         "network_counts": result.counts,

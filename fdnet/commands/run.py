@@ -32,13 +32,12 @@ def add_case_commands(commands: Any) -> None:
     run.add(OUTPUT, "--resume", "continue an unfinished run")
     run.share("--force", "--stages", "--json", "--quiet")
     run.share("--fast")
-    dry = "run and write nothing; print velocities, time steps and what is odd (fdnet render CASE "
-    dry += "--out DIR writes the LIGGGHTS decks too)"
+    dry = "write nothing; print velocities, time steps and what is odd (fdnet render: decks too)"
     run.add(OUTPUT, "--dry-run", dry)
 
     about = "say what is odd about a case, what to do about it, and what the run takes"
     check = new_command(commands, "check", _check, about, "fdnet check mine.toml --strict")
-    check.share("case", "--seed", "--set", "--np", "--json")
+    check.share("case", "--seed", "--set", "--np", "--json", "--fast")
     check.add(OUTPUT, "--strict", "end with exit code 2 where anything is odd")
 
     about = "write the LIGGGHTS decks, and print what fdnet run --dry-run prints"
@@ -111,8 +110,6 @@ def _run(options: argparse.Namespace) -> int:
     from fdnet.run.pipeline import run_stages
     from fdnet.run.records import RunOptions, cores
 
-    if options.fast:
-        options.set = [*options.set, 'invasion.method="network"']
     case = case_of(options)
     if options.dry_run:
         _refuse_refused(_print_scales(case))

@@ -24,6 +24,7 @@ from fdnet.scales.pack import (
     PACK_STAGES,
     PACK_START,
     PACK_STEP,
+    POROSITY_TOLERANCE,
     densest_porosity,
     grain_count,
     pack_step,
@@ -138,7 +139,6 @@ def render_pack(case: Case, *, count: int) -> Deck:
 
 
 # ---- Packs are made until one has the porosity that is asked for.
-POROSITY_TOLERANCE = 0.003  # Accepted difference to the porosity of the case
 ATTEMPTS = 8  # Most packs with different numbers of grains that are tried
 PLACES = 4
 """Most sets of random places from which the same grains are packed, when they do not come to

@@ -44,7 +44,8 @@ def percent(share: float | None) -> str:
 
 def two_digits(share: float) -> str:
     """A share in percent with two digits and the sign of percent."""
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+    digits = ".2g" if share < 0.99 else ".1f" if share < 1.0 else ".0f"  # 99.7 % is not all
+    return f"{100 * share:{digits}} %"
 
 
 def millimetres(length: float | None) -> str:

@@ -167,16 +167,25 @@ def answer_sentence(summary: Mapping[str, Any]) -> str:
 TWICE = 2.0  # Standard deviations of seeds that are added to a depth before it is acted on
 
 
+def _safe_depth(summary: Mapping[str, Any]) -> float | None:
+    """The 95 % depth and two standard deviations of seeds, m; None if the specimen ends before."""
+    end, spread = summary["sections"][-1]["x_hi_m"], summary["scatter"]["depth_p95_relative"]
+    depth = summary["invasion_depth_p95_m"] * (1.0 + TWICE * spread)
+    return None if summary["damage"]["reaches_the_end"] or depth > end else float(depth)
+
+
 def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
     p95 = (
         f"95 % of the fines that entered lie within {millimetres(summary['invasion_depth_p95_m'])}"
     )
     limit = two_digits(damage["lost_from"])
+    safe, short = _safe_depth(summary), "The specimen is too short to say how deep the damage goes"
     if summary["final"] is False:
         if summary["stop_reason"] == "unfinished":
+            do = "Continue the run with --resume before you use these numbers."
             return (
                 f"Provisional, at {percent(summary['share_done'])} % of the invasion: so far "
-                f"{p95}. Continue the run with --resume before you use these numbers."
+                f"{p95}. {do if safe else f'{short}: lengthen the box.'}"
             )
         cut, more = "the run was cut at its cap", "raise run.cap_ms"
         if summary["stop_reason"] == "mud_cut_off":
@@ -188,23 +197,18 @@ def _depth_words(summary: Mapping[str, Any], damage: Mapping[str, Any]) -> str:
     if not damage["zone_depth_m"]:
         return f"{p95}, and no layer loses {limit} of its permeability: the damage is negligible."
     law = f" by the law {_law_of(summary)}" if followed(summary) is not None else ""
-    scatter, end = summary["scatter"], summary["sections"][-1]["x_hi_m"]
+    scatter, depth = summary["scatter"], millimetres(damage["face_depth_m"])
     spread = scatter["depth_p95_relative"]
-    depth = millimetres(damage["face_depth_m"])
     face = (
         f"The first {'millimetre' if depth == '1 mm' else depth} lost "
         f"{two_digits(damage['face_lost'])} "
         f"of the permeability{law} (from seed to seed ± {100 * scatter['first_mm_loss']:.2g} "
         f"points), and {p95} (± {two_digits(spread)})."
     )
-    beyond = summary["invasion_depth_p95_m"] * (1.0 + TWICE * spread)
-    if damage["reaches_the_end"] or beyond > end:
-        return (
-            f"{face} The specimen is too short to say how deep a perforation, a cut or a wash "
-            "must reach: lengthen the box."
-        )
+    if safe is None:
+        return f"{face} {short}, or a perforation, a cut or a wash must reach: lengthen the box."
     return (
-        f"{face} Let a perforation, a cut or a wash reach deeper than {1e3 * beyond:.2g} mm: that "
+        f"{face} Let a perforation, a cut or a wash reach deeper than {1e3 * safe:.2g} mm: that "
         "is the 95 % depth and two standard deviations of seeds."
     )
 
@@ -216,6 +220,8 @@ def _skin_words(summary: Mapping[str, Any]) -> str:
     well = f"a well of {millimetres(summary['skin_well_radius_m'])} radius"
     if skin <= 0:
         return f"For {well} this is no skin."
+    if _safe_depth(summary) is None:
+        return f"For {well} the skin is {skin:.2g} or more."
     size = "small" if lost < SMALL else "large" if lost > LARGE else "moderate"
     return (
         f"For {well} this is a {size} skin of {skin:.2g}, which costs {two_digits(lost)} of the "

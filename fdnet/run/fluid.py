@@ -28,21 +28,13 @@ from fdnet.dem.checkpoint import Checkpoint, entered_by, time_of
 from fdnet.dem.invade_deck import DrivingFluid, FluidForces, Moment, drag_rate
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.supply import batches_of
-from fdnet.network.fines.crowding import Neighbourhood, local_porosity
+from fdnet.network.fines.crowding import local_porosity
+from fdnet.network.fines.occupancy import ratio
 from fdnet.run import network_flow
 from fdnet.run.cake import Standing, standing_cake
 from fdnet.scales.drag import crowd_drag_factor
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array, Snapshot
-
-
-def crowd_factor(scales: InvasionScales, near: Neighbourhood, radius: Array, slip: Array) -> Array:
-    """Factor (N,) on the drag of lone fines of `radius` m and superficial `slip` m/s.
-
-    It is the total force in the crowd, Y F_b / phi.
-    """
-    reynolds = scales.push.reynolds_slope * radius / near.size_ratio * slip
-    return crowd_drag_factor(near.porosity, near.size_ratio, reynolds) / near.porosity
 
 
 def _speed(velocity: Array) -> Array:
@@ -188,6 +180,8 @@ def history_rows(
 STANDING = 0.5
 """A fine belongs to the deposit when it is slower than this share of the velocity given to it."""
 
+BEDDED = 1e3  # Drag on a sphere that finer solids in a full pore hold, over that of the fluid
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class NetworkFluid:
@@ -197,7 +191,6 @@ class NetworkFluid:
     scales: InvasionScales
     grains: Snapshot  # of the pack, fixed
     standing: float = STANDING
-    renewed: float = network_flow.RENEWED
 
     @property
     def measured(self) -> tuple[str, ...]:
@@ -219,7 +212,7 @@ class NetworkFluid:
     @cached_property
     def renewal(self) -> network_flow.Renewal:
         """The damaged pack, from one update to the next."""
-        return network_flow.Renewal(self.pack, renewed=self.renewed)
+        return network_flow.Renewal(self.pack)
 
     @cached_property
     def finer(self) -> FinerClasses | None:
@@ -267,7 +260,8 @@ class NetworkFluid:
         share = pack.share_at(fines.position, carried)
         shape = intact * share[:, None]
         slip = _speed(before * shape - fines.velocity)
-        factor = crowd_factor(scales, near, fines.radius, slip)
+        reynolds = scales.push.reynolds_slope * fines.radius / near.size_ratio * slip
+        factor = crowd_drag_factor(near.porosity, near.size_ratio, reynolds) / near.porosity
         crowd, goes = lone * factor, ~standing
         density = self.case.fines.density_kg_m3 if moment.density is None else moment.density
         rate = drag_rate(fines, crowd, density)
@@ -297,14 +291,16 @@ class NetworkFluid:
         pressed, fluid = drop * pressed, speed * shape
         pace = np.maximum(_speed(speed * intact), speed)
         force, volume = _speed(pressed), 4.0 / 3.0 * np.pi * fines.radius**3
-        going = np.divide(force, pace, out=np.zeros_like(force), where=pace > 0)
+        going = ratio(force, pace)
         coefficient = np.where(held, np.maximum(going, lone), crowd)
         velocity = np.where(held[:, None], pressed / coefficient[:, None], fluid)
         push = np.where(held[:, None], 0.0, pressed)
         if self.case.drag.pressure_gradient:
             local = self._viscosity * volume * (speed * np.where(within, share, 0.0))
             gradient = pack.shape.pressure_gradient_at(measured.position)
-            push = -pack.scale * gradient * local[:, None] + push
+            # the network's resistance over that of the coarse resolved field
+            scale = pack.length / pack.permeability / pack.shape.resistance
+            push = -scale * gradient * local[:, None] + push
 
         # the push of the intact pack's gradient is part of what the network gives to the grains
         drag = coefficient * np.where(held, velocity[:, 0], (velocity - fines.velocity)[:, 0])
@@ -312,6 +308,10 @@ class NetworkFluid:
         on_fines = float(drag[within].sum()) + float(pressed[outside, 0].sum())
         on_grains, on_held = drop * float(carried.pressed.grains[0]), float(pressed[held, 0].sum())
         whole, law = (drop + loose) * pack.network.area, float(crowd[held] @ fluid[held, 0])
+        if finer is not None:
+            bedded = self._bedded(fines, intact, finer.full)
+            coefficient[bedded] *= BEDDED
+            velocity[bedded], push[bedded] = 0.0, 0.0
         # rates and pressures are those of the fluid itself, which is slower than a driven one
         driven = scales.force_factor
         return FluidForces(
@@ -357,6 +357,20 @@ class NetworkFluid:
         velocity = self._before(moment) / self.scales.force_factor
         cake = float(4.0 / 3.0 * np.pi * np.sum(stack.fines.radius**3))
         return self.finer.among(Passed(before, filtrate, velocity), Stands(kept, in_pores, cake))
+
+    def _bedded(self, fines: Snapshot, intact: Array, full: Array) -> Array:
+        """Which of the `fines` lie in, or reach along the `intact` flow (N, 3) into, full pores.
+
+        `full` (G,) says which groups of pores are.
+        """
+        pack = self.pack
+        way = ratio(intact, _speed(intact)[:, None])
+        way[fines.position[:, 0] < 0.0] = [1.0, 0.0, 0.0]
+        found = np.zeros(len(fines), bool)
+        for place in (fines.position, fines.position + way * fines.radius[:, None]):
+            within = (place[:, 0] >= 0.0) & (place[:, 0] < pack.length)
+            found[within] |= full[pack.network.pore_group[pack.pore_of(place[within])]]
+        return found
 
     def _before(self, moment: Moment) -> float:
         """Superficial velocity up to this moment, m/s."""

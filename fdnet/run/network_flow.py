@@ -80,6 +80,8 @@ what the fines close."""
 CELLS, SLIP = 10.0, 0.15
 """Cells of the resolved field across a grain (docs/evidence/error_against_time.md), and the rms
 velocity over the superficial one that it leaves at the walls (docs/theory/resolved_flow.md)."""
+Finer = Callable[[Array, Array], Narrowed]
+"""From the shares (T, 2) that spheres leave of the sides and their m3 (P,) in the pores."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -121,17 +123,6 @@ class PackFlow:
     def permeability(self) -> float:
         """Of the intact pack by its network, m2."""
         return self.flow.inflow * self.length / self.network.area
-
-    @property
-    def scale(self) -> float:
-        """The network's resistance over that of the coarse resolved field."""
-        return self.length / self.permeability / self.shape.resistance
-
-    def sections(self, fines: Snapshot, former: KeptSections | None) -> KeptSections:
-        """The sections of the throats among `fines`, from a `former` state where there is one."""
-        if former is not None:
-            return former.changed_to(fines)
-        return measured_sections(self.network, fines, parts=self.parts, step=STEP)
 
     def carried(self, kept: Array, fines: Array, finer: Array | None = None) -> Carried:
         """What the pores carry when the sides have `kept` (T, 2) of their clean conductances.
@@ -242,21 +233,14 @@ def pore_through(network: Network, flow: Flow) -> Array:
     return (np.maximum(into, out) / flow.inflow)[group]
 
 
-Finer = Callable[[Array, Array], Narrowed]
-"""What they do, from the shares (T, 2) that the spheres leave to the sides, and the volumes (P,)
-m3 of the spheres in the pores."""
-
-
 @dataclass(slots=True, eq=False)
 class Renewal:
     """What a damaged pack carries; its network is solved when enough of the deposit changed."""
 
     pack: PackFlow  # the intact pack
-    renewed: float = RENEWED
     solved: Snapshot | None = None  # the fines of the last solve; None before the first
     sections: KeptSections | None = None  # of the throats, as they were at the last solve
     carried: Carried | None = None  # what the last solve gave
-    solves: int = 0  # number of solves
 
     def of(
         self, fines: Snapshot, *, anew: bool, finer: Finer | None = None
@@ -269,18 +253,21 @@ class Renewal:
         """
         inside, pack = fines.where(reaching_inside(self.pack.network, fines)), self.pack
         deposit = measured_deposit(pack.holders, inside)
-        if anew or self.carried is None or changed_share(self.solved, inside) > self.renewed:
-            self.sections = pack.sections(inside, self.sections)
+        if anew or self.carried is None or changed_share(self.solved, inside) > RENEWED:
+            known, parts = self.sections, pack.parts
+            self.sections = (
+                measured_sections(pack.network, inside, parts=parts, step=STEP)
+                if known is None
+                else known.changed_to(inside)
+            )
             self.carried, self.solved = None, inside
         assert self.sections is not None
-        kept = self.sections.factor
-        volume = None
+        kept, volume = self.sections.factor, None
         if finer is not None:
             kept, volume, grown = finer(kept, deposit.in_pores)
             self.carried = None if grown else self.carried
         if self.carried is None:
             self.carried = pack.carried(kept, deposit.in_pores, volume)
-            self.solves += 1
         return self.carried, deposit
 
 

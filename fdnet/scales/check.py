@@ -1,5 +1,6 @@
 """What is doubtful in a case, and what its run takes: what `fdnet check` says."""
 
+import math
 import textwrap
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
@@ -13,6 +14,7 @@ from fdnet.scales.clock import TAKEN_SOLIDS, spoken_time
 from fdnet.scales.cost import Cost, cost_of, peak_memory
 from fdnet.scales.drag import BRIDGING
 from fdnet.scales.flow import USUAL_WELL, Losses, radial
+from fdnet.scales.pack import POROSITY_TOLERANCE, grain_count
 from fdnet.scales.scales import InvasionScales, Scales, scales_of
 
 
@@ -70,6 +72,7 @@ def width_error(width: float, *, periodic: bool) -> float:
 MOST_WIDTH_ERROR = 0.10
 """Error of the permeability by the width of the specimen, from which it is named."""
 LEAST_LENGTH = 3.0  # Length over the mean grain, below which it is named
+MOST_GRAIN = 3.0  # One grain's porosity over the tolerance of a pack, from which it is named
 ABSURD = 10.0
 """Velocity over that at a usual well, from which it is named; the square of it where the case
 gives the velocity or a plug."""
@@ -107,6 +110,17 @@ def findings(case: Case, scales: Scales) -> Iterator[Finding]:
             do=f"take a length of {8e3 * mean:.2g} mm, 8 grains, or more",
             read="docs/how-to/your_sand_and_your_mud.md",
         )
+    grain = case.grains.mean_volume_m3 / math.prod(case.size_m)
+    if case.grains.count is None and grain > (most := MOST_GRAIN * POROSITY_TOLERANCE):
+        yield Finding(
+            key="grains.porosity",
+            what=f"one grain is {grain:.2g} of the porosity, and a pack must meet it within "
+            f"{POROSITY_TOLERANCE:g}",
+            follows="no pack may meet it, and then the run stops before the invasion",
+            do=f"take a box of {grain / most:.2g} times the volume, or give grains.count = "
+            f"{grain_count(case)} in place of the porosity",
+            read="docs/how-to/seeds_and_cost.md",
+        )
     diameter, count = 2 * case.grains.mean_radius_m, case.analysis.sections
     assert isinstance(count, int)
     thickness = case.size_m[0] / count
@@ -130,8 +144,8 @@ def _of_the_invasion(case: InvasionCase, scales: InvasionScales) -> Iterator[Fin
     usual = losses.velocity(case.fluid.overbalance_Pa, radial(radius, outer)) / scales.porosity
     ratio = scales.interstitial_velocity / usual
     given = case.fluid.velocity_m_s is not None or case.fluid.darcy_length_m is not None
-    odd = ABSURD**2 if given else ABSURD
-    if not 1 / odd <= ratio <= odd:
+    odd = ABSURD**2 if given else ABSURD  # without all three a warning of the scales says it
+    if (given or case.well is not None) and not 1 / odd <= ratio <= odd:
         yield Finding(
             key="well",
             what=f"the fluid moves at {scales.interstitial_velocity:.3g} m/s in the pores, "

@@ -24,9 +24,9 @@ BESIDE_CLASSES = 5
 """Steps beside finer classes over those without: springs are stiffened for what presses the
 spheres."""
 CLASSES_PLUG = 0.25
-"""What a volume of finer classes plugs over what it would as spheres: 0.37 by the filtrates of one
-mud with and without its finer half (docs/validation/cuts.csv). A mud with 83 % of finer solids had
-no plug when 1,198 spheres had come, so that it is at most 0.33 there."""
+"""What a volume of finer classes plugs over what it would as spheres: about 1 where these are as
+coarse as the throats (filtrates of docs/validation/cuts.csv). A mud with 83 % of finer solids had
+no plug when 1,198 spheres had come, so that it is at most 0.33 there (by a former law)."""
 FALLING_RATE = 0.6  # Mean rate over the first, where the deposit slows the flow
 WAITING, TRICKLING = 2.0, 1.4
 """Plug times that the face is watched when what plugs it has come; passages of the fluid through

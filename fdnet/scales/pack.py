@@ -19,6 +19,10 @@ from fdnet.errors import CaseError, Doubt
 from fdnet.scales.contacts import REFERENCE_OVERLAP, Contact, mass_range
 from fdnet.sizes import SURFACE, SizeCurve
 
+POROSITY_TOLERANCE = 0.003  # Accepted difference of a pack to the porosity of the case
+WORST_OVERLAP = 3.0
+"""Largest overlap of a pack over the mean one of `refuse_unreachable`: 3.3, 2.8 and 2.5 measured
+at porosities of 0.30, 0.25 and 0.20 (grains of cases/quick.toml)."""
 GAP = 0.7654  # Smallest gap over the shorter of its two rods
 RODS = 5000  # Rods on the line; the result is within 0.001 of that of many more
 EQUAL_SPHERES = 0.6435  # Random close packing of equal spheres; every range of sizes fills more
@@ -152,9 +156,13 @@ def size_warnings(case: Case) -> Iterator[Doubt]:
     if case.grains.measured and case.grains.count is None and porosity is not None:
         rigid = 1 - close_packing(case.grains.curve)
         if porosity < rigid:
+            most = WORST_OVERLAP * (1 - ((1 - rigid) / (1 - porosity)) ** (1 / 3))
+            refused = ": the pack will be refused" if most > case.grains.max_overlap else ""
             yield Doubt(
                 "denser-than-spheres",
-                f"grains.porosity: {reach_text(rigid)}; at {porosity:g} grains overlap",
+                f"grains.porosity: {reach_text(rigid)}; at {porosity:g} grains overlap by up to "
+                f"some {100 * most:.0f} % of a diameter (grains.max_overlap is "
+                f"{case.grains.max_overlap:g}{refused})",
             )
 
 

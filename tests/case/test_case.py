@@ -245,7 +245,7 @@ def test_bad_input_is_one_clear_error(tmp_path, capsys):
         ({"mud": coarse}, "above every throat"),
         ({"mud": wide}, "solids as large as the grains"),
         ({"sand": sand, "mud": mud}, "above every throat between touching grains"),
-        ({"solids": 'concentration = "45 %"'}, "fines.concentration: 0.45"),
+        ({"solids": 'concentration = "45 %"'}, "45 % of the mud's volume, expected at most 30"),
         ({"solids": 'solids = "400 lb/bbl"'}, "expected at most"),
         ({"solids": 'solids = "25 ppb"'}, "pounds per barrel or parts per billion"),
         ({"solids": both}, "give exactly one of the two"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders import followed
+from builders import followed, resting_spheres
 from cut_and_continue import differences
 
 from fdnet.case.file import case_from
@@ -10,10 +10,12 @@ from fdnet.classes.beside_spheres import Passed, Stands
 from fdnet.classes.deposit import kept_shares
 from fdnet.dem import checkpoint
 from fdnet.dem.checkpoint import Checkpoints
+from fdnet.dem.invade_deck import Moment
 from fdnet.errors import CaseError
 from fdnet.run.fluid import fluid_of
 from fdnet.run.pipeline import run_case
 from fdnet.scales.scales import scales_of
+from fdnet.spheres.snapshot import Kind
 
 pytestmark = pytest.mark.liggghts
 ENDS = "run.plug_rate=0.05"
@@ -127,6 +129,29 @@ def test_spheres_hold_classes_that_would_pass_without_them(fluid):
         own = kept_shares(finer.sieve, finer.solids, finer.own)
         assert left.kept == pytest.approx(factor * own, rel=1e-9)
     assert held[1] > 1.5 * held[0]
+
+
+def test_spheres_and_classes_share_the_room_of_a_pore(fluid):
+    """It is full at 0.60 (1 - 0.29 d / l) of both together; what is there or arrives stays."""
+    finer, network = fluid.finer, fluid.pack.network
+    size, void = finer.classes.diameter[[0, -1]], finer.sieve.void
+    packed = 0.6 * (1.0 - 0.29 * 2.0 / np.sum(1.0 / size) / finer.sieve.room) * void
+    first = np.unique(network.pore_group, return_index=True)[1]
+    sides, big = np.ones(finer.kept.shape), void > 0.3 * void.mean()
+    for spheres, classes, full in ((0.49, 0.49, False), (0.51, 0.51, True), (2.0, 0.0, False)):
+        finer.forget()
+        finer.solids.in_pores[:, 0] = classes * packed
+        held = np.zeros(len(network.pore_group))
+        held[first] = spheres * packed / network.pore_share[first]
+        finer.among(Passed(0.0, 0.0, 1e-3), Stands(sides, held, 0.0))
+        assert np.all(finer.full[big] == full)
+    finer.solids.in_pores[:, 0] = 1.1 * packed
+    place = np.array([(-0.75, 3.0, 3.0), (-0.25, 3.0, 3.0), (2.0, 3.0, 3.0)]) * size[1]
+    some = resting_spheres(place, 0.5 * size[1], fluid.grains.box, kind=Kind.FINE, first=10_000)
+    now = Moment(step=0, time=0.0, before=None, fresh=True)
+    acts = fluid.forces(fluid.grains.joined(some), now)
+    assert np.array_equal(acts.velocity[:, 0] > 0.0, [True, False, False])
+    assert np.all(acts.coefficient[1:] > 100.0 * acts.coefficient[0])
 
 
 def test_the_common_flow_ends_it_where_the_spheres_would_go_on(tmp_path, monkeypatch):

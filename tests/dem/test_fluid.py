@@ -10,9 +10,7 @@ from builders import followed, resting_spheres
 from fdnet.case.file import case_from
 from fdnet.dem import invade_deck as deck
 from fdnet.dem.checkpoint import quiet_chunks
-from fdnet.dem.deck import specimen_box, write_data
 from fdnet.dem.invasion import invade
-from fdnet.dem.liggghts import Launch, run_deck
 from fdnet.dem.supply import batches_of, densities
 from fdnet.errors import CaseError
 from fdnet.network.field.field import velocity_field
@@ -20,7 +18,6 @@ from fdnet.run.cake import cake_summary, measure_cake
 from fdnet.run.fluid import Movers, NetworkFluid, fluid_of, history_rows, mean_ahead
 from fdnet.run.network_flow import Renewal, on_each_fine
 from fdnet.scales.scales import scales_of
-from fdnet.spheres.dump import read_frame
 from fdnet.spheres.snapshot import Kind, Snapshot
 
 pytestmark = pytest.mark.liggghts
@@ -349,6 +346,8 @@ class Watched:
         assert moment.given == pytest.approx(known, rel=1e-9)
         self.compared += np.count_nonzero(known)
         made = self.fluid.forces(spheres, moment)
+        still = (spheres.fines().id + len(self.seen)) % 2 == 0  # zeros have no rows
+        made.velocity[still], made.push[still] = 0.0, 0.0
         went = np.linalg.norm(made.velocity + made.push / made.coefficient[:, None], axis=1)
         self.answer = dict(zip(spheres.fines().id, went, strict=True))
         return made
@@ -362,7 +361,6 @@ def test_liggghts_shows_the_velocity_that_each_fine_was_given(go, fluid, tmp_pat
     assert watched.compared > 1000
 
 
-# ---- What LIGGGHTS shows and takes in.
 def test_the_fluid_is_asked_with_the_density_of_each_fine(go, grains_of, tmp_path):
     sizes = {"D10_mm": 0.09, "D90_mm": 0.11}
     materials = [
@@ -379,37 +377,6 @@ def test_the_fluid_is_asked_with_the_density_of_each_fine(go, grains_of, tmp_pat
     for present, density in watched.seen:
         assert np.array_equal(density, everyone[present.id.astype(int) - 1 - int(grains.id.max())])
         assert set(density) == {1100.0, 2200.0}
-
-
-def test_liggghts_shows_the_densities_and_takes_in_only_the_last_forces(binary, tmp_path):
-    """No number of the first forces is left after the second ones, where zeros have no rows."""
-    case = followed()
-    box, place = specimen_box(case), [[2e-4, 5e-4, 5e-4], [6e-4, 5e-4, 5e-4]]
-    two = resting_spheres(place, 5e-5, box, kind=Kind.FINE, first=2)
-    grain = Snapshot.from_arrays([[-1e-3, 1e-3, 1e-3]], 3e-4, box=box)
-    bounds = box + np.array([[-2e-3, 1e-3], [0.0, 0.0], [0.0, 0.0]])
-    density = np.array([2650.0, 2650.0, 1100.5])
-    data = tmp_path / "invade.data"
-    write_data(data, grain.joined(two), bounds=bounds, density=density, types=3)
-    (tmp_path / "in.invade").write_text(deck.render_invade(case, scales_of(case), grain).text)
-    (tmp_path / "post").mkdir()
-    deck.write_parts(case, scales_of(case), grain, tmp_path)
-    still = {"coefficient": np.ones(2), "push": np.zeros((2, 3)), "pace": 1.0, "measures": {}}
-    given = np.array([[[1.0, 2.0, -3.0], [4.0, 5.0, 6.0]], [[7.0, 0.0, 0.0], [0.0, -8.0, 0.0]]])
-
-    def play(feed):
-        feed("include in.invade", "include ask.in")
-        assert np.array_equal(deck.fine_density(deck.read_state(tmp_path)), [2650.0, 1100.5])
-        for number, velocity in enumerate(given):
-            deck.write_forces(tmp_path, two, deck.FluidForces(velocity=velocity, **still))
-            show = f"write_dump fines custom post/{number}.dump id f_uf[1] f_uf[2] f_uf[3]"
-            feed("include fluid.in", f"{show} modify sort id")
-
-    run_deck(tmp_path, "in.invade", Launch(binary=binary), play)
-    for number, velocity in enumerate(given):
-        frame = read_frame(tmp_path / "post" / f"{number}.dump")
-        shown = np.column_stack([frame.column(f"f_uf[{axis}]") for axis in (1, 2, 3)])
-        assert np.array_equal(shown, velocity)
 
 
 # ---- What fines meet on the way until the next update.

@@ -212,6 +212,8 @@ SUMMARY = {
     "scatter": {"depth_p95_relative": 0.36, "first_mm_loss": 0.067, "runs": 30, "source": "x.csv"},
 }
 WELL = {"skin": 0.056, "skin_flow_lost": 0.0081, "skin_well_radius_m": 0.108}
+SHORT = WELL | {"sections": [{"x_hi_m": 2.3e-3}]}
+UNFINISHED = {"final": False, "stop_reason": "unfinished", "share_done": 0.34}
 FLOW = {"drag_last_update": {"k_over_k0": 0.278}, "damage_law_used": "thesis"}
 
 
@@ -232,7 +234,9 @@ def test_the_answer_is_a_sentence_to_act_on():
     cut_off = {"final": False, "stop_reason": "mud_cut_off"}
     for changed, said, not_said in [
         ({}, [*first, "than 2.4 mm"], "skin"),
-        ({"sections": [{"x_hi_m": 2.3e-3}]}, ["too short", "lengthen the box"], "deeper"),
+        (SHORT, ["too short", "lengthen the box", "the skin is 0.056 or more"], "deeper"),
+        (SHORT | UNFINISHED, ["Provisional, at 34.0 %", "too short", "or more"], "Continue"),
+        (UNFINISHED, ["so far 95 %", "Continue the run"], "too short"),
         (WELL, ["small skin of 0.056", "0.81 % of the flow", "108 mm"], "infinite"),
         (WELL | {"skin": None, "skin_flow_lost": 1.0}, ["skin is infinite"], "small"),
         (WELL | {"skin": -1e-4, "skin_flow_lost": -1e-5}, ["this is no skin"], "-"),
