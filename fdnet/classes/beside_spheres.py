@@ -22,7 +22,6 @@ import numpy as np
 from fdnet.case.case import InvasionCase
 from fdnet.classes.capture import Bed, SizeClasses, filter_coefficient, mud_classes
 from fdnet.classes.deposit import (
-    NONE,
     Deposits,
     Release,
     Sieve,
@@ -36,7 +35,7 @@ from fdnet.classes.deposit import (
     thickness_of_cake,
 )
 from fdnet.classes.invasion import bed_of, cake_permeability, cake_resistance, release_of
-from fdnet.classes.transport import streams_of
+from fdnet.classes.transport import NONE, streams_of
 from fdnet.files import replacing
 from fdnet.network.flow.flow import Flow
 from fdnet.network.network import Network

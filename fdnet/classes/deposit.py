@@ -6,15 +6,13 @@ behind whatever is wider than the gaps of its bed, and so does the cake, which i
 pores of the face turn away.
 """
 
-import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from fdnet.classes.capture import TIGHT, SizeClasses, bridging_chance, covered, wider_share
-from fdnet.classes.transport import Streams, carry
-from fdnet.network.compiled import loops_in_place
+from fdnet.classes.capture import TIGHT, SizeClasses, covered, wider_share
+from fdnet.classes.transport import Streams, carry, pile_up
 from fdnet.network.flow.flow import PLANE_TOLERANCE
 from fdnet.network.network import Network
 from fdnet.spheres.snapshot import Array, frozen, one_line
@@ -123,8 +121,6 @@ FULL = 0.95  # Filled share from which a pore begins to act as a bed
 ADDED, BED = 1210.0, 855.0
 """Resistance that a deposit adds to a side of a throat, times (d l)^1.5 and d^2 l, over the square
 of the share of the void that it takes: measured for large fines, and Carman and Kozeny's bed."""
-WEDGES = 1.3
-"""A fine up to so many passages wide sits in the throat that holds it, a wider one before it."""
 
 
 class Loads(NamedTuple):
@@ -143,28 +139,17 @@ def loads_of(
 
     What sticks to the grains is no pile that stops others, but narrows the pore all the same.
     """
-    count, half = len(sieve.void), 0.5 * _sums(solids.in_throats, classes)
-    held = _sums(solids.in_pores, classes)
+    count = len(sieve.void)
+    sums, own = np.zeros((count, 2)), classes.diameter
+    pile_up(sieve.ends, solids.in_pores, solids.in_throats, own, sums)
     if with_attached:
-        held += _sums(solids.attached, classes)
-    held += sum(_gathered(ends, half, count) for ends in sieve.ends.T)
-    volume, inverse = held.T
+        pile_up(sieve.ends, solids.attached, solids.in_throats[:0], own, sums)
+    volume, inverse = sums.T
     size = np.divide(volume, inverse, out=np.zeros(count), where=inverse > 0)
     share = np.divide(volume, sieve.void, out=np.zeros(count), where=sieve.void > 0)
     wide = np.divide(size, sieve.room, out=np.zeros(count), where=sieve.room > 0)
     full = (1.0 - PACKED) * np.maximum(1.0 - LOOSE * wide, 0.25)
     return Loads(share=share, filled=share / full, diameter=size)
-
-
-def _sums(deposit: Array, classes: SizeClasses) -> Array:
-    """Of solids (M, C) m3 the volume, and that of each class over its diameter, (M, 2)."""
-    parts = np.column_stack([np.ones(len(classes.diameter)), 1.0 / classes.diameter])
-    return np.einsum("mc,cp->mp", deposit, parts)  # not by BLAS, whose threads wait for each other
-
-
-def _gathered(where: Array, values: Array, count: int) -> Array:
-    """Sums (count, C) of rows (K, C) that belong to the same of `count` pores."""
-    return np.stack([np.bincount(where, one, count) for one in values.T], axis=1)
 
 
 def bed_diameter(deposit: Array, classes: SizeClasses) -> Array:
@@ -195,20 +180,16 @@ def bed_holds(size: Array, classes: SizeClasses) -> Array:
 
 
 # ---- What each link holds back, and where that goes.
-LOADED = (0.06, 1.6, 0.33)
-"""Chance per arrival that a deposit beside a throat stops a fine: a + b s, at most c, of the share
-s that it takes of the two pores."""
-NONE = 1e-3
-"""Share of two pores below which a deposit stops nothing: less than a fine in hundreds of them."""
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Holding:
-    """What links (K) and the face hold back in one step."""
+    """What pores (N) and the face (F of them) hold back in one step."""
 
-    held: Array  # (K, C) share of each class that a link holds back
-    stuck: Array  # (K, C) the part of it that sticks to grains, as a share of all; (0, C): none
-    feed: Array  # (N, C) volume over that of the fluid that enters a pore of the face
+    solid: Array  # (N,) m3 of deposit, which stops fines beside it
+    full: Array  # (N,) 0 up to a filled share of FULL, 1 in a full pore, which acts as a bed
+    gap: Array  # (N,) logarithm of the widest sphere, m, that passes the deposit
+    bare: Array  # (N,) share of the surface to which nothing sticks yet
+    filtering: Array  # (C,) 1/m, of clean grains
+    feed: Array  # (F, C) volume over that of the fluid that enters
 
     __repr__ = one_line
 
@@ -217,69 +198,24 @@ def holding(
     sieve: Sieve, solids: Deposits, classes: SizeClasses, streams: Streams, filtering: Array
 ) -> Holding:
     """What holds back what, with the deposit as it is; `filtering` (C,) 1/m is of clean grains."""
-    loads, throat = loads_of(sieve, solids, classes), streams.link
-    # 0 up to a filled share of FULL, 1 in a full pore
+    loads, face = loads_of(sieve, solids, classes), np.flatnonzero(streams.fed)
     full = np.clip((loads.filled - FULL) / (1.0 - FULL), 0.0, 1.0)
-    one, other = streams.source, streams.target
-    void = np.maximum(sieve.void, 1e-30)
-    near = (loads.share * void)[one] + (loads.share * void)[other]
-    near /= void[one] + void[other]
-    start, slope, most = LOADED
-    chance = np.where(near > 0, np.minimum(start * (near > NONE) + slope * near, most), 0.0)
-    clean = np.maximum(sieve.passage[throat], 1e-12)
-    held = np.empty((len(throat), len(classes.diameter)))
-    stuck, way = held[:0], np.zeros(0)
+    bare = np.ones(len(full))
     if np.any(filtering > 0):
-        bare = 1.0 - covered(solids.attached, classes, sieve.surface)[one]
-        stuck, way = np.empty_like(held), sieve.reach[throat] / sieve.winding * bare
-    with np.errstate(divide="ignore"):
-        gap = np.log(TIGHT * loads.diameter)
-    gap[loads.diameter <= 0] = np.inf
-    low, high = np.log(classes.low), np.log(classes.high)
-    _shares(
-        *(one, other, clean, np.log(clean), chance, full, gap, way, filtering),
-        *(classes.diameter, high, np.maximum(high - low, 1e-12), held, stuck),
-    )
-    feed, face = np.zeros((len(void), len(classes.diameter))), np.flatnonzero(streams.fed)
+        bare -= covered(solids.attached, classes, sieve.surface)
+    gap = np.log(TIGHT * np.where(loads.diameter > 0, loads.diameter, np.inf))
     size, own = (bed_diameter(cake, classes) for cake in (solids.cake[None], solids.cake))
     layers = thickness_of_cake(sieve, solids) / float(own) if own > 0 else 0.0
     admitted = 1.0 - full[face, None] * bed_holds(loads.diameter[face], classes)
     admitted *= 1.0 - min(1.0, layers) * bed_holds(size, classes)
-    feed[face] = admitted * classes.concentration
-    return Holding(held=held, stuck=stuck, feed=feed)
-
-
-@loops_in_place
-def _shares(
-    source: Array,
-    target: Array,
-    clean: Array,
-    passage: Array,
-    chance: Array,
-    full: Array,
-    gap: Array,
-    way: Array,
-    filtering: Array,
-    diameter: Array,
-    high: Array,
-    width: Array,
-    held: Array,
-    stuck: Array,
-) -> None:
-    """Sets `held` and `stuck` (K, C); `passage` (K,), `gap` (N,) and `high` (C,) are logarithms,
-    `width` (C,) is that of a class."""
-    for k in range(len(source)):
-        before, behind = gap[source[k]], gap[target[k]]
-        for i in range(len(diameter)):
-            wide = min(max((high[i] - passage[k]) / width[i], 0.0), 1.0)
-            beside = min(max((high[i] - min(before, behind)) / width[i], 0.0), 1.0)
-            bed = min(max((high[i] - behind) / width[i], 0.0), 1.0)
-            passing = (1.0 - wide) * (1.0 - bridging_chance(diameter[i] / clean[k]))
-            passing *= (1.0 - chance[k] * beside) * (1.0 - full[target[k]] * bed)
-            if len(stuck):
-                stuck[k, i] = -math.expm1(-filtering[i] * way[k])
-                passing *= 1.0 - stuck[k, i]
-            held[k, i] = 1.0 - passing
+    return Holding(
+        solid=loads.share * sieve.void,
+        full=full,
+        gap=gap,
+        bare=bare,
+        filtering=filtering,
+        feed=admitted * classes.concentration,
+    )
 
 
 def thickness_of_cake(sieve: Sieve, solids: Deposits) -> float:
@@ -299,62 +235,26 @@ def advanced(
 
     What was held goes to throats, pores and grains.
     """
-    void, face = fluid_void(sieve, solids), np.flatnonzero(streams.fed)
-    carried, held, passed = carry(
-        streams, filtrate, void=void, inside=solids.carried, feed=what.feed, holds=what.held
+    face, entered = np.flatnonzero(streams.fed), filtrate * streams.fed[streams.fed > 0, None]
+    names = ["carried", "in_pores", "in_throats", "passed"]
+    names += ["attached"] if np.any(what.filtering > 0) else []
+    new = replace(solids, **{name: getattr(solids, name).copy() for name in names})
+    new.carried[face] += entered * what.feed
+    low, high = np.log(classes.low), np.log(classes.high)
+    carry(
+        *(streams.order, streams.first, streams.target, streams.link, streams.share),
+        *(streams.outlet, filtrate, fluid_void(sieve, solids), np.maximum(sieve.void, 1e-30)),
+        *(what.solid, what.full, what.gap, what.bare, np.maximum(sieve.passage, 1e-12)),
+        *(sieve.reach / sieve.winding, what.filtering, classes.diameter, classes.volume),
+        *(high, 1.0 / np.maximum(high - low, 1e-12)),
+        *(new.carried, new.in_pores, new.attached, new.in_throats, new.passed),
     )
-    carried *= void[:, None]
-    in_pores, in_throats = solids.in_pores.copy(), solids.in_throats.copy()
-    attached = solids.attached.copy() if len(what.stuck) else solids.attached
-    _settle(
-        *(streams.source, streams.link, held, what.held, what.stuck, sieve.passage),
-        *(classes.diameter, classes.volume, in_pores, attached, in_throats),
-    )
-    entered, come = filtrate * streams.fed[face, None], classes.concentration
+    come = classes.concentration
     return replace(
-        solids,
-        carried=carried,
-        in_pores=in_pores,
-        attached=attached,
-        in_throats=in_throats,
-        cake=solids.cake + np.sum(entered * (come - what.feed[face]), axis=0),
-        passed=solids.passed + passed,
+        new,
+        cake=solids.cake + np.sum(entered * (come - what.feed), axis=0),
         supplied=solids.supplied + np.sum(entered * come, axis=0),
     )
-
-
-@loops_in_place
-def _settle(
-    source: Array,
-    link: Array,
-    held: Array,
-    share: Array,
-    stuck: Array,
-    passage: Array,
-    diameter: Array,
-    volume: Array,
-    in_pores: Array,
-    attached: Array,
-    in_throats: Array,
-) -> None:
-    """Adds `held` (K, C) m3 to the solids, wide ones first: a throat has room for one fine."""
-    for k in range(len(source)):
-        pore, throat, taken = source[k], link[k], 0.0
-        for i in range(len(volume)):
-            taken += in_throats[throat, i] / volume[i]
-        room = 1.0 - min(taken, 1.0)
-        for i in range(len(volume) - 1, -1, -1):
-            rest = held[k, i]
-            if len(stuck) and share[k, i] > 0.0:
-                sticks = rest * min(stuck[k, i] / share[k, i], 1.0)  # not above it by rounding
-                attached[pore, i] += sticks
-                rest -= sticks
-            if diameter[i] <= WEDGES * passage[throat]:
-                wedged = min(rest, room * volume[i])
-                room = max(room - wedged / volume[i], 0.0)
-                in_throats[throat, i] += wedged
-                rest -= wedged
-            in_pores[pore, i] += rest
 
 
 # ---- Release: the flow lifts what sticks where it pulls at the wall hard enough.
@@ -385,7 +285,8 @@ def released(
     share = np.divide(swept, out, out=np.zeros(count), where=out > 0)
     from_grains = solids.attached * (loose * share)[:, None]
     from_throats = solids.in_throats * (loose * lifts)[:, None]
-    freed = _gathered(np.where(high >= low, one, other), from_throats, count)
+    before = np.where(high >= low, one, other)
+    freed = np.stack([np.bincount(before, own, count) for own in from_throats.T], axis=1)
     return replace(
         solids,
         carried=solids.carried + freed + from_grains,

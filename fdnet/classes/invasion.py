@@ -1,7 +1,8 @@
 """The invasion of classes through time: flow, transport and deposit, step by step.
 
 Each step solves the flow with what the deposit left of the throats, carries all classes, and lets
-the deposit grow. The length of a step is that in which the resistance changes by `CHANGE`.
+the deposit grow. What the deposit holds back in a step is what it would in the middle of it. The
+length of a step is that in which the resistance changes by `CHANGE`.
 """
 
 from collections.abc import Callable, Mapping
@@ -33,7 +34,7 @@ from fdnet.scales.flow import api_permeability, carman_kozeny, darcy_through, pa
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
-CHANGE = 0.05  # Relative change of the resistance of the pack in one step
+CHANGE = 0.1  # Relative change of the resistance of the pack in one step
 LEAST_STEP, FIRST_STEP = 1e-6, 0.02
 """m3 of fluid over the pores of the specimen: in the shortest step, and in the first."""
 MOST_STEPS = 5000
@@ -227,7 +228,7 @@ def invade_classes(
             break
         bed = replace(course.bed, velocity=velocity)
         filtering = filter_coefficient(classes, bed, course.sticking)
-        what = holding(sieve, solids, classes, state.streams, filtering)
+        first = holding(sieve, solids, classes, state.streams, filtering)
         rate, bounds = velocity * sieve.area, []
         bounds.append((course.supply - supplied) / mud)
         bounds.append(((course.duration or course.cap_time) - time) * rate)
@@ -235,17 +236,19 @@ def invade_classes(
             bounds.append(0.25 * course.plug_time * rate)
         volume = min(wanted, *bounds)
         while True:
-            loose = solids
+            loose, streams = solids, state.streams
             if course.release:
-                law, streams = course.release, state.streams
-                loose = released(sieve, solids, streams, drop, volume / rate, law)
-            after = advanced(sieve, loose, classes, state.streams, what, volume)
+                loose = released(sieve, solids, streams, drop, volume / rate, course.release)
+            half = advanced(sieve, loose, classes, streams, first, 0.5 * volume)
+            middle = holding(sieve, half, classes, streams, filtering)
+            del half  # which is large, as is `after`
+            after = advanced(sieve, loose, classes, streams, middle, volume)
             new = kept_shares(sieve, after, classes)
             change = _change(sieve, state.energy, kept, new)
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
                 break
             volume *= max(0.2, CHANGE / change)
-            del after  # which is large, before the next try
+            del after
         wanted = volume * min(max(CHANGE / max(change, 1e-9), 0.3), 2.0)
         come = volume * mud * float(state.streams.fed.sum())
         entered = come - float(np.sum(after.cake - solids.cake))
@@ -253,7 +256,7 @@ def invade_classes(
         crossing = entered / (mud * volume) * velocity / course.velocity
         quiet = quiet + volume / rate if crossing <= course.plug_rate else 0.0
         solids, kept = after, new
-        del what, after
+        del loose, after
         state = flow_with(kept, state.flow)
         reason = _ended(course, time, quiet, float(solids.supplied.sum()))
     return ClassInvasion(

@@ -5,11 +5,12 @@ pressure the upwind system is lower triangular, and one sweep solves it for all 
 implicit Euler step on docs/theory/size_classes.md.
 """
 
+import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
+from fdnet.classes.capture import bridging_chance
 from fdnet.network.compiled import loops_in_place
 from fdnet.spheres.snapshot import Array, one_line
 
@@ -68,71 +69,120 @@ def streams_of(
     )
 
 
-class Swept(NamedTuple):
-    """What one step gave, of pores (N), links (K) and classes (C)."""
-
-    concentration: Array
-    """(N, C) volume of solids over that of the fluid in each pore."""
-    held: Array
-    """(K, C) m3 that each link held back, in the order of `Streams`."""
-    passed: Array
-    """(C,) m3 that left through the outlet."""
-
-
-def carry(
-    streams: Streams, filtrate: float, *, void: Array, inside: Array, feed: Array, holds: Array
-) -> Swept:
-    """The concentrations after `filtrate` m3 of fluid have entered.
-
-    Args:
-        streams: the flow.
-        filtrate: m3 of fluid in this step.
-        void: (N,) m3 of fluid in each pore.
-        inside: (N, C) m3 of solids carried in each pore at the start.
-        feed: (N, C) concentrations of what enters a pore from outside.
-        holds: (K, C) share that each link of `streams` holds back.
-    """
-    after, held = np.zeros_like(inside), np.empty_like(holds)
-    entered, passed = (filtrate * streams.fed)[:, None] * feed, np.zeros(inside.shape[1])
-    _sweep(
-        *(streams.order, streams.first, streams.target, filtrate * streams.share),
-        *(streams.outlet, void, inside, holds, entered, after, held, passed),
-    )
-    return Swept(after, held, passed)
+LOADED = (0.06, 1.6, 0.33)
+"""Chance per arrival that a deposit beside a throat stops a fine: a + b s, at most c, of the share
+s that it takes of the two pores."""
+NONE = 1e-3
+"""Share of two pores below which a deposit stops nothing: less than a fine in hundreds of them."""
+WEDGES = 1.3
+"""A fine up to so many passages wide sits in the throat that holds it, a wider one before it."""
 
 
 @loops_in_place
-def _sweep(
+def carry(
     order: Array,
     first: Array,
     target: Array,
-    volume: Array,
+    link: Array,
+    share: Array,
     outlet: Array,
+    filtrate: float,
+    fluid: Array,
     void: Array,
-    inside: Array,
-    holds: Array,
-    entered: Array,
-    after: Array,
-    held: Array,
+    solid: Array,
+    full: Array,
+    gap: Array,
+    bare: Array,
+    passage: Array,
+    way: Array,
+    filtering: Array,
+    diameter: Array,
+    volume: Array,
+    high: Array,
+    over: Array,
+    carried: Array,
+    in_pores: Array,
+    attached: Array,
+    in_throats: Array,
     passed: Array,
 ) -> None:
-    """Sets `after` (N, C), `held` (K, C) and `passed` (C,); `entered` (N, C) holds what is fed."""
-    classes = inside.shape[1]
+    """Carry the classes (C) through all links and settle what each holds back.
+
+    The first six describe the flow (`Streams`). Pores (N) have `fluid` and `void` m3 and the
+    filling that `deposit.Holding` describes, throats (T) a `passage` m and a clean `way` m, on
+    which `filtering` (C,) 1/m acts. Classes have a `diameter`, the `volume` of one fine, the
+    logarithm of their `high` end, and `over`, 1 over its distance from that of the low end. The
+    last five change. `carried` (N, C) m3 is what pores and `filtrate` bring; at each pore it
+    becomes a concentration first.
+    """
+    start, slope, most = LOADED
     for place in range(len(order)):
         n = order[place]
         if outlet[n]:
-            for i in range(classes):
-                passed[i] += entered[n, i]
+            for i in range(len(volume)):
+                passed[i] += carried[n, i]
+                carried[n, i] = 0.0
             continue
-        leaving = 0.0
+        whole = fluid[n]
         for k in range(first[n], first[n + 1]):
-            leaving += volume[k]
-        room = void[n] + leaving
-        for i in range(classes):
-            come = inside[n, i] + entered[n, i]
-            after[n, i] = come / room if room > 0.0 else 0.0
+            whole += filtrate * share[k]
+        for i in range(len(volume)):
+            carried[n, i] /= whole
         for k in range(first[n], first[n + 1]):
-            for i in range(classes):
-                moved = volume[k] * after[n, i]
-                held[k, i] = moved * holds[k, i]
-                entered[target[k], i] += moved - held[k, i]
+            throat, behind, flow = link[k], target[k], filtrate * share[k]
+            near = (solid[n] + solid[behind]) / (void[n] + void[behind])
+            chance = min(start * (near > NONE) + slope * near, most)
+            clean, beside, room = math.log(passage[throat]), min(gap[n], gap[behind]), 2.0
+            narrow = 1.0 / passage[throat]
+            # wide ones first, for a throat has room for one fine
+            for i in range(len(volume) - 1, -1, -1):
+                moved = flow * carried[n, i]
+                if moved <= 0.0:
+                    continue
+                wide = min(max((high[i] - clean) * over[i], 0.0), 1.0)
+                near_wide = min(max((high[i] - beside) * over[i], 0.0), 1.0)
+                bed = min(max((high[i] - gap[behind]) * over[i], 0.0), 1.0)
+                loose = (1.0 - wide) * (1.0 - bridging_chance(diameter[i] * narrow))
+                loose *= (1.0 - chance * near_wide) * (1.0 - full[behind] * bed)
+                sticks = 0.0
+                if filtering[i] > 0.0:
+                    sticks = -math.expm1(-filtering[i] * way[throat] * bare[n])
+                held = moved * (1.0 - loose * (1.0 - sticks))
+                carried[behind, i] += moved - held
+                if held <= 0.0:
+                    continue
+                if sticks > 0.0:
+                    stuck = min(moved * sticks, held)  # not above it by rounding
+                    attached[n, i] += stuck
+                    held -= stuck
+                if diameter[i] * narrow <= WEDGES:
+                    if room > 1.0:
+                        room = 1.0
+                        for j in range(len(volume)):
+                            room -= in_throats[throat, j] / volume[j]
+                    wedged = min(held, max(room, 0.0) * volume[i])
+                    room -= wedged / volume[i]
+                    in_throats[throat, i] += wedged
+                    held -= wedged
+                in_pores[n, i] += held
+        for i in range(len(volume)):
+            carried[n, i] *= fluid[n]
+
+
+@loops_in_place
+def pile_up(ends: Array, in_pores: Array, in_throats: Array, diameter: Array, sums: Array) -> None:
+    """Add to `sums` (N, 2) the m3 of all classes (C) in a pore, and this over their diameter.
+
+    What is in a throat counts half for each of its `ends` (T, 2).
+    """
+    for n in range(len(in_pores)):
+        for i in range(len(diameter)):
+            sums[n, 0] += in_pores[n, i]
+            sums[n, 1] += in_pores[n, i] / diameter[i]
+    for t in range(len(in_throats)):
+        for i in range(len(diameter)):
+            half = 0.5 * in_throats[t, i]
+            if half > 0.0:
+                for side in range(2):
+                    sums[ends[t, side], 0] += half
+                    sums[ends[t, side], 1] += half / diameter[i]

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from fdnet.case.spheres import Fines
-from fdnet.classes.capture import Bed, SizeClasses, collector_efficiency, mud_classes, wider_share
+from fdnet.classes import invasion
+from fdnet.classes.capture import (
+    Bed,
+    SizeClasses,
+    bridging_chance,
+    collector_efficiency,
+    mud_classes,
+    wider_share,
+)
 from fdnet.classes.deposit import (
     Release,
     Sieve,
@@ -14,12 +22,13 @@ from fdnet.classes.deposit import (
     fluid_void,
     holding,
     kept_shares,
+    loads_of,
     no_solids,
     released,
     sieve_of,
 )
 from fdnet.classes.invasion import Course, flows_through, invade_classes
-from fdnet.classes.transport import carry, streams_of
+from fdnet.classes.transport import streams_of
 from fdnet.network.flow.flow import solve_flow
 from fdnet.network.laws.deposit_resistances import grain_resistances
 from fdnet.network.network import build_network
@@ -126,27 +135,52 @@ def test_a_flow_lifts_a_deposit_above_the_critical_wall_stress_alone():
 
 
 def test_one_sweep_solves_the_balance_of_every_pore():
-    """The same system, assembled and solved by elimination."""
+    """The same system with the laws of the page, assembled and solved by elimination."""
     rng, count = np.random.default_rng(3), 30
     pressure = rng.random(count)
     ends = np.array([(a, b) for a in range(count) for b in range(a) if rng.random() < 0.3])
     flux = pressure[ends[:, 0]] - pressure[ends[:, 1]]
     inlet, outlet = pressure > 0.8, pressure < 0.15
     streams = streams_of(ends, flux, pressure, inlet=inlet, outlet=outlet)
-    void, inside = rng.random(count), rng.random((count, 2))
-    feed, holds = rng.random((count, 2)), rng.random((len(streams.link), 2))
-    got = carry(streams, 0.7, void=void, inside=inside, feed=feed, holds=holds)
+    links = {
+        "ends": ends,
+        "passage": rng.uniform(0.1, 0.5, len(ends)),
+        "reach": rng.random(len(ends)),
+    }
+    sieve = replace(chain(count), void=rng.random(count), inlet=inlet, outlet=outlet, **links)
+    classes = replace(sizes(0.2, 0.3, concentration=0.2), high=np.array([0.25, 0.4]))
+    solids = no_solids(sieve, classes)
+    solids.carried[~outlet] = 0.05 * rng.random((int(np.sum(~outlet)), 2))
+    solids.in_pores[:] = (
+        np.where(rng.random(count) < 0.5, 0.6 * sieve.void * rng.random(count), 0)[:, None] / 2
+    )
+    filtering = np.array([0.3, 0.0])
+    what = holding(sieve, solids, classes, streams, filtering)
+    got = advanced(sieve, solids, classes, streams, what, 0.7)
+    loads, void, d = loads_of(sieve, solids, classes), sieve.void, classes.diameter
+    full = np.clip((loads.filled - 0.95) / 0.05, 0, 1)
+    assert full.max() == 1.0
+    assert full.min() == 0.0
     for i in range(2):
-        matrix, source = np.diag(void), inside[:, i] + 0.7 * streams.fed * feed[:, i]
+        matrix, source = np.diag(fluid_void(sieve, solids)), solids.carried[:, i].copy()
+        source[streams.fed > 0] += 0.7 * streams.fed[streams.fed > 0] * what.feed[:, i]
         for k in range(len(streams.link)):
             a, b, w = streams.source[k], streams.target[k], 0.7 * streams.share[k]
+            passage = sieve.passage[streams.link[k : k + 1]]
+            near = (solids.in_pores[a] + solids.in_pores[b]).sum() / (void[a] + void[b])
+            gaps = [0.1547 * one if one > 0 else np.inf for one in loads.diameter[[a, b]]]
+            loose = 1 - wider_share(classes, passage)[0, i]
+            loose *= 1 - bridging_chance.py_func(d[i] / passage[0])
+            chance = min(0.06 + 1.6 * near, 0.33) if near > 1e-3 else 1.6 * near
+            loose *= 1 - chance * wider_share(classes, np.array([min(gaps)]))[0, i]
+            loose *= 1 - full[b] * wider_share(classes, np.array([gaps[1]]))[0, i]
+            loose *= np.exp(-filtering[i] * sieve.reach[streams.link[k]])
             matrix[a, a] += w
-            matrix[b, a] -= w * (1.0 - holds[k, i])
-        expected = np.linalg.solve(matrix, source)
-        assert got.concentration[~outlet, i] == pytest.approx(expected[~outlet], rel=1e-12)
-        fed = float(np.sum(0.7 * streams.fed * feed[:, i])) + inside[~outlet, i].sum()
-        kept = float(void[~outlet] @ got.concentration[~outlet, i])
-        assert kept + got.held[:, i].sum() + got.passed[i] == pytest.approx(fed, rel=1e-13)
+            matrix[b, a] -= w * loose
+        there = np.linalg.solve(matrix, source) * fluid_void(sieve, solids)
+        assert got.carried[~outlet, i] == pytest.approx(there[~outlet], rel=1e-12)
+        before, after = (one.inside_by_class + one.passed + one.cake for one in (solids, got))
+        assert after - got.supplied == pytest.approx(before, rel=1e-13)
 
 
 def test_contact_efficiency_of_a_colloid():
@@ -248,3 +282,15 @@ def test_a_class_wider_than_every_throat_stays_at_the_face():
     assert end.stop_reason == "plugged"
     assert end.solids.cake[0] > 0
     assert not np.any(end.solids.in_pores[~sieve.inlet])
+
+
+def test_a_tenth_of_the_step_hardly_changes_the_permeability(monkeypatch):
+    """What the deposit holds back is that of the middle of a step, and not of its beginning."""
+    sieve, flow = pack()
+    classes, whole = sizes(0.4, 0.6, concentration=0.2), course(sieve, supply=10.0, plug_time=4e3)
+    long = invade_classes(sieve, classes, whole, flow)
+    monkeypatch.setattr(invasion, "CHANGE", 0.1 * invasion.CHANGE)
+    monkeypatch.setattr(invasion, "FIRST_STEP", 0.1 * invasion.FIRST_STEP)
+    short = invade_classes(sieve, classes, whole, flow)
+    assert len(short.rows) > 8 * len(long.rows)
+    assert long.rows[-1]["k_over_k0"] == pytest.approx(short.rows[-1]["k_over_k0"], rel=0.04)

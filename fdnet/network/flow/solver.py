@@ -4,6 +4,7 @@ Systems are symmetric and positive definite.
 """
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.sparse.linalg import splu
 
 from fdnet.errors import FlowError
 from fdnet.network.compiled import compiled
-from fdnet.spheres.snapshot import Array
+from fdnet.spheres.snapshot import Array, frozen
 
 DIRECT, MULTIGRID = "splu, METIS nested dissection", "CG, Ruge-Stuben AMG"
 DIRECT_UP_TO = 3_000  # Number of nodes up to which the direct solver is used
@@ -139,10 +140,17 @@ def dissected(links: sparse.csr_matrix) -> Array:
     """Order (n,) of the nodes of `links` (n, n) by METIS dissection (Karypis and Kumar 1998)."""
     links.setdiag(0.0)
     links.eliminate_zeros()
-    if links.nnz == 0:
-        return np.arange(links.shape[0])
-    adjacency = pymetis.CSRAdjacency(links.indptr, links.indices)
-    return np.asarray(pymetis.nested_dissection(adjacency=adjacency)[0])
+    return _dissection(links.indptr.tobytes(), links.indices.tobytes(), links.indices.dtype.str)
+
+
+@lru_cache(maxsize=1)
+def _dissection(first: bytes, other: bytes, kind: str) -> Array:
+    """That of the last links is kept: a flow is solved again and again on the same ones."""
+    first_of, nodes = np.frombuffer(first, kind), np.frombuffer(other, kind)
+    if not len(nodes):
+        return np.arange(len(first_of) - 1)
+    adjacency = pymetis.CSRAdjacency(first_of, nodes)
+    return frozen(np.asarray(pymetis.nested_dissection(adjacency=adjacency)[0]))
 
 
 def multigrid(matrix: sparse.csr_matrix) -> Solve:
