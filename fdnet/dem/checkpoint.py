@@ -295,7 +295,7 @@ def empty_chunks(case: InvasionCase, scales: InvasionScales) -> int:
 
 
 REST = 0.01
-"""Mean velocity of the fines inside over that of the fluid at the start, at which they rest."""
+"""Mean velocity of the fines inside over the fluid's first one at which they rest in any case."""
 
 
 def quiet_enough(
@@ -306,10 +306,10 @@ def quiet_enough(
     In the uniform field it is the thesis's: no more fines cross the face in the plug time than
     the allowance, or once no fine is left upstream, none leaves in the time of `empty_chunks`.
 
-    Where the flow follows the deposit it looks at all that moves. No more than the allowance cross
-    the face and the outlet together, and the fines inside are at `REST`. This takes the plug time
-    while mud is left at the face, and else the time of `empty_chunks`. Fewer than `ARRIVALS` fines
-    are no mud: they say nothing of the face.
+    Where the flow follows the deposit no more than the allowance cross the face and the outlet
+    together, and those inside move at `run.plug_rate` of the fluid's first velocity at the most. It
+    takes the plug time while mud is at the face, and else that of `empty_chunks`. Fewer than
+    `ARRIVALS` fines are no mud: they say nothing of the face.
     """
     follows = case.drag.coupled
     mud = row.waiting >= (ARRIVALS if follows else 1)
@@ -321,7 +321,7 @@ def quiet_enough(
     fines = snapshot_of(frame, case, time_s=0.0).fines()
     inside = (fines.position[:, 0] >= 0) & (fines.position[:, 0] < case.size_m[0])
     speed = float(np.mean(fines.velocity[inside, 0])) if inside.any() else 0.0
-    return speed <= REST * scales.drive_velocity
+    return speed <= max(REST, case.run.plug_rate) * scales.drive_velocity
 
 
 def flow_says(folder: Path, case: InvasionCase, scales: InvasionScales, step: int) -> str | None:
@@ -356,11 +356,12 @@ def time_of(row: Checkpoint, scales: InvasionScales) -> float:
 # deposit: steps of a chunk go with the root of the stiffness, so history.csv records it.
 
 
-RAISE_ABOVE, RAISE_TO, MOST_RAISE = 0.67, 0.6, 2.0
+RAISE_ABOVE, RAISE_TO, MOST_RAISE, GROWN = 0.67, 0.6, 2.0, 1.1
 """Shares of `PRESSED`: springs are stiffened at a checkpoint when the overlap that lasted in the
-chunk before was above the first and more than before, so that it would have been the second. At
-most so many times the steps at once. A fine that is wedged between grains keeps its overlap with
-stiffer springs too."""
+chunk before was above the first, so that it would have been the second. At most so many times the
+steps at once. A fine that is wedged between grains keeps its overlap with stiffer springs too: one
+that is not the last times that of the chunk before is left until it is above `PRESSED` and grows.
+"""
 
 
 def lasting_overlap(seen: Sequence[float]) -> float:
@@ -374,7 +375,8 @@ def steps_after(case: InvasionCase, steps: int, overlap: float, before: float = 
     In the chunk `before` it was another. It goes with the stiffness k to the power -1 (Hertz
     -2/3), the step with k to -1/2.
     """
-    if not rises(case) or overlap <= max(before, RAISE_ABOVE * PRESSED):
+    least = RAISE_ABOVE if overlap > GROWN * before else 1.0
+    if not rises(case) or overlap <= max(before, least * PRESSED):
         return steps
     power = 0.75 if case.contact.model == "hertz" else 0.5
     return math.ceil(steps * min(MOST_RAISE, (overlap / (RAISE_TO * PRESSED)) ** power))
