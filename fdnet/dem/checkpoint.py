@@ -307,8 +307,8 @@ def quiet_enough(
     the allowance, or once no fine is left upstream, none leaves in the time of `empty_chunks`.
 
     Where the flow follows the deposit no more than the allowance cross the face and the outlet
-    together, and those inside move at `run.plug_rate` of the fluid's first velocity at the most. It
-    takes the plug time while mud is at the face, and else that of `empty_chunks`. Fewer than
+    together, and those inside move at `run.plug_rate` of the fluid's first velocity at the most.
+    It takes the plug time while mud is at the face, and else that of `empty_chunks`. Fewer than
     `ARRIVALS` fines are no mud: they say nothing of the face.
     """
     follows = case.drag.coupled
@@ -358,10 +358,9 @@ def time_of(row: Checkpoint, scales: InvasionScales) -> float:
 
 RAISE_ABOVE, RAISE_TO, MOST_RAISE, GROWN = 0.67, 0.6, 2.0, 1.1
 """Shares of `PRESSED`: springs are stiffened at a checkpoint when the overlap that lasted in the
-chunk before was above the first, so that it would have been the second. At most so many times the
-steps at once. A fine that is wedged between grains keeps its overlap with stiffer springs too: one
-that is not the last times that of the chunk before is left until it is above `PRESSED` and grows.
-"""
+chunk before was above the first, so that it would have been the second; at most so many times the
+steps at once. One that grew less than the last times is a wedged fine's, which stiffer springs do
+not free: it is left up to `PRESSED`."""
 
 
 def lasting_overlap(seen: Sequence[float]) -> float:
@@ -370,10 +369,9 @@ def lasting_overlap(seen: Sequence[float]) -> float:
 
 
 def steps_after(case: InvasionCase, steps: int, overlap: float, before: float = 0.0) -> int:
-    """Steps of the chunk after one of `steps` steps with an `overlap` that lasted.
+    """Steps of the chunk after one of `steps`, by the `overlap` that lasted and the one `before`.
 
-    In the chunk `before` it was another. It goes with the stiffness k to the power -1 (Hertz
-    -2/3), the step with k to -1/2.
+    It goes with the stiffness k to the power -1 (Hertz -2/3), the step with k to -1/2.
     """
     least = RAISE_ABOVE if overlap > GROWN * before else 1.0
     if not rises(case) or overlap <= max(before, least * PRESSED):

@@ -113,8 +113,7 @@ def test_springs_grow_with_the_square_of_the_steps_of_a_chunk():
     assert steps_after(case, usual, 0.02) == usual
     assert steps_after(case, usual, 0.03) == math.ceil(usual * math.sqrt(1 / 0.6))
     assert steps_after(case, usual, 0.9) == 2 * usual
-    assert steps_after(case, usual, 0.03, 0.029) == usual, "a wedged fine"
-    assert steps_after(case, usual, 0.03, 0.027) == steps_after(case, usual, 0.03)
+    assert steps_after(case, usual, 0.03, 0.027) > usual == steps_after(case, usual, 0.03, 0.028)
     assert steps_after(case, usual, 0.031, 0.03) > usual == steps_after(case, usual, 0.031, 0.031)
     assert lasting_overlap([0.9, *[0.02] * 10]) == 0.02, "an impact is no load"
     assert lasting_overlap([0.9, 0.9, *[0.02] * 10]) == 0.9
