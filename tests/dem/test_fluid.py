@@ -285,8 +285,7 @@ def test_a_face_is_plugged_once_all_that_moves_has_come_to_rest(go, fluid, tmp_p
         x, along = spheres.position[:, 0], spheres.velocity[:, 0] / scales.drive_velocity
         rest = along[(x >= 0) & (x < case.size_m[0])].mean() <= max(share, 0.01)
         ends.append(rest and row.quiet >= chunks)
-    assert result.stop_reason == "plugged"
-    assert ends.index(True) == len(ends) - 1
+    assert (result.stop_reason, ends.index(True)) == ("plugged", len(ends) - 1)
     assert min(same[:-1]) <= plug_allowance(case, scales)
 
 
