@@ -329,7 +329,7 @@ class Run(Part):
     """The face is plugged when no fine crossed it for this time. When absent: until the fluid has
     passed four grains and ten fines have arrived."""
     plug_rate: Annotated[float, Field(ge=0, lt=1)] = 0.05
-    """Share of the undisturbed supply that may still cross a plugged face."""
+    """Share of the undisturbed supply that may cross a plugged face; inside, of its velocity."""
     stop_rate: Fraction | None = None
     """Share of the first rate below which the face is plugged (field "network")."""
     stop_pore_volumes: Positive | None = None

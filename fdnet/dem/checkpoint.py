@@ -295,7 +295,7 @@ def empty_chunks(case: InvasionCase, scales: InvasionScales) -> int:
 
 
 REST = 0.01
-"""Mean velocity of the fines inside over that of the fluid at the start, at which they rest."""
+"""Mean velocity of the fines inside over the fluid's first one at which they rest in any case."""
 
 
 def quiet_enough(
@@ -306,10 +306,10 @@ def quiet_enough(
     In the uniform field it is the thesis's: no more fines cross the face in the plug time than
     the allowance, or once no fine is left upstream, none leaves in the time of `empty_chunks`.
 
-    Where the flow follows the deposit it looks at all that moves. No more than the allowance cross
-    the face and the outlet together, and the fines inside are at `REST`. This takes the plug time
-    while mud is left at the face, and else the time of `empty_chunks`. Fewer than `ARRIVALS` fines
-    are no mud: they say nothing of the face.
+    Where the flow follows the deposit no more than the allowance cross the face and the outlet
+    together, and those inside move at `run.plug_rate` of the fluid's first velocity at the most.
+    It takes the plug time while mud is at the face, and else that of `empty_chunks`. Fewer than
+    `ARRIVALS` fines are no mud: they say nothing of the face.
     """
     follows = case.drag.coupled
     mud = row.waiting >= (ARRIVALS if follows else 1)
@@ -321,7 +321,7 @@ def quiet_enough(
     fines = snapshot_of(frame, case, time_s=0.0).fines()
     inside = (fines.position[:, 0] >= 0) & (fines.position[:, 0] < case.size_m[0])
     speed = float(np.mean(fines.velocity[inside, 0])) if inside.any() else 0.0
-    return speed <= REST * scales.drive_velocity
+    return speed <= max(REST, case.run.plug_rate) * scales.drive_velocity
 
 
 def flow_says(folder: Path, case: InvasionCase, scales: InvasionScales, step: int) -> str | None:
