@@ -229,7 +229,7 @@ def invade_classes(
         bed = replace(course.bed, velocity=velocity)
         filtering = filter_coefficient(classes, bed, course.sticking)
         first = holding(sieve, solids, classes, state.streams, filtering)
-        rate, bounds = velocity * sieve.area, []
+        rate, bounds = velocity * sieve.area, [max(0.5 * pores, 0.1 * filtrate)]
         bounds.append((course.supply - supplied) / mud)
         bounds.append(((course.duration or course.cap_time) - time) * rate)
         if course.duration is None:
@@ -277,14 +277,14 @@ def _change(sieve: Sieve, energy: Array, before: Array, after: Array) -> float:
 
 def _ended(course: Course, time: float, quiet: float, supplied: float) -> str:
     """Why the invasion ends now; "" where it goes on."""
-    near = 1.0 - 1e-9
-    if course.duration is not None:
-        return "duration" if time >= near * course.duration else ""
-    if quiet >= near * course.plug_time:
+    near, given = 1.0 - 1e-9, course.duration is not None
+    if not given and quiet >= near * course.plug_time:
         return "plugged"
     if supplied >= near * course.supply:
         return "supply_exhausted"
-    return "cap" if time >= near * course.cap_time else ""
+    if time >= near * (course.duration or course.cap_time):
+        return "duration" if given else "cap"
+    return ""
 
 
 def cake_permeability(case: InvasionCase) -> float | None:

@@ -124,7 +124,9 @@ def class_model(
         plug_rate=run.plug_rate,
         plug_time=scales.plug_time * physical,
         cap_time=scales.cap_time * physical,
-        supply=scales.supplied_count * fines.mean_volume_m3 / fines.curve.kept,
+        supply=math.inf
+        if fines.endless and run.duration_s is not None
+        else scales.supplied_count * fines.mean_volume_m3 / fines.curve.kept,
         sticking=choices.sticking,
         release=release_of(case),
         bed=bed_of(case, scales, drive.velocity),
