@@ -131,7 +131,9 @@ def test_solids_by_mass_are_the_concentration_by_volume():
         assert case.fines.concentration is None
         assert case.fines.volume_fraction == pytest.approx(kg / density, rel=1e-9), solids
         assert case_from(tomllib.loads(case.toml())) == case
-    with pytest.raises(CaseError, match=r"fines\.solids_kg_m3: 855.* by volume; expected at most"):
+    with pytest.raises(
+        CaseError, match=r"fines\.solids_kg_m3: 855.* of the mud's volume, expected at most"
+    ):
         case_from(TINY | {"fines": TINY["fines"] | {"solids": "300 lb/bbl"}})
     with pytest.raises(CaseError, match="give exactly one of the two"):
         case_from(TINY | {"fines": TINY["fines"] | {"solids": "3 lb/bbl", "concentration": 0.1}})
