@@ -179,7 +179,7 @@ def test_a_class_above_every_throat_is_said_to_be_cake(fast):
 
 
 def test_a_pack_without_a_path_and_a_mud_above_packing_are_refused(fast, monkeypatch):
-    with pytest.raises(CaseError, match="fines.concentration: .* at most 30 %"):
+    with pytest.raises(CaseError, match=r"fines.concentration: .* at most 30 %"):
         tiny(*FAST, "fines.concentration=0.65")
     shut = lambda network: np.full((len(network.throat_radius), 2), np.inf)  # noqa: E731
     monkeypatch.setattr(by_classes, "grain_resistances", shut)
