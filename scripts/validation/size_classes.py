@@ -154,6 +154,8 @@ def main(arguments: Sequence[str]) -> int:
             print(costs[-1], flush=True)
         return 0
     runs = [run for one in options.ensembles for run in finished_in(one)]
+    if not runs:
+        parser.error("no finished run in runs/ of these folders: give those of ensembles")
     rows = [both(open_run(one)) for one in runs]
     write_rows(options.csv, rows)
     print("\n".join(bands(pd.DataFrame(rows))))
