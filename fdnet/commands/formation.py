@@ -27,7 +27,7 @@ def add_formation(commands: Any) -> None:
         (core, "--rate RATE", "of the flood, as 1ml/min", partial(_si, "_m3_s")),
         (core, "--pressure PRESSURE", "over core and cake, as 7bar", pressure),
         (core, "--minutes N", "length of the flood (default 30)", float),
-        (core, "--back-flow N", "pore volumes back after a [clean_up] (default 10)", float),
+        (core, "--back-flow N", "pore volumes of back-flow after [clean_up] (default 10)", float),
         (core, "--sections N", "between pressure taps (default 4)", int),
         (well, "--hours N", "that the mud stands (default 12)", float),
         (well, "--pressure PRESSURE", "overbalance, as 300psi (default: of the case)", pressure),
