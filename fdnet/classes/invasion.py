@@ -2,7 +2,8 @@
 
 Each step solves the flow with what the deposit left of the throats, carries all classes, and lets
 the deposit grow. What the deposit holds back in a step is what it would in the middle of it. The
-length of a step is that in which the resistance changes by `CHANGE`.
+length of a step is that in which the resistance of the pack changes by `CHANGE`, or that of all
+that the fluid passes.
 """
 
 from collections.abc import Callable, Mapping
@@ -34,7 +35,7 @@ from fdnet.scales.flow import api_permeability, carman_kozeny, darcy_through, pa
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
-CHANGE = 0.1  # Relative change of the resistance of the pack in one step
+CHANGE = 0.1  # Relative change of the resistance of the pack, or of the whole way, in one step
 LEAST_STEP, FIRST_STEP = 1e-6, 0.02
 """m3 of fluid over the pores of the specimen: in the shortest step, and in the first."""
 MOST_STEPS = 5000
@@ -198,6 +199,7 @@ def invade_classes(
     for _ in range(MOST_STEPS):
         cake = cake_resistance(course.cake_permeability, sieve, solids, classes)
         velocity = course.velocity
+        beyond = 1.0 / max(state.k_over_k0, 1e-300) + course.rest
         if not course.at_rate:
             more = cake / course.resistance
             velocity = velocity_in(velocity, course.rest, state.k_over_k0, more)
@@ -245,6 +247,9 @@ def invade_classes(
             after = advanced(sieve, loose, classes, streams, middle, volume)
             new = kept_shares(sieve, after, classes)
             change = _change(sieve, state.energy, kept, new)
+            if not course.at_rate:  # the rate falls with the cake too
+                grown = cake_resistance(course.cake_permeability, sieve, after, classes) - cake
+                change = max(change, grown / (cake + course.resistance * beyond))
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
                 break
             volume *= max(0.2, CHANGE / change)
