@@ -129,7 +129,7 @@ def kept_by(run: FinishedRun) -> Array:
 
 def _rested(run: FinishedRun, case: InvasionCase) -> list[Rested]:
     """The spheres as one kind, then each class of the network."""
-    classes = rested_classes(run, case) if case.by_classes or case.with_classes else []
+    classes = rested_classes(run, case) if "method" in run.summary else []
     if case.by_classes:
         return classes
     fines = run.spheres().fines()
