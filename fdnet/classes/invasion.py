@@ -28,6 +28,7 @@ from fdnet.classes.deposit import (
     thickness_of_cake,
 )
 from fdnet.classes.transport import Streams, streams_of
+from fdnet.errors import FlowError
 from fdnet.network.fines.occupancy import ratio
 from fdnet.network.flow.flow import Flow, solve_flow
 from fdnet.network.network import Network
@@ -191,7 +192,10 @@ def invade_classes(
     flow_with: PackStateOf,
     watch: Callable[[int, Deposits, Flow], None] = lambda *_: None,
 ) -> ClassInvasion:
-    """Let the mud in until the course ends; `watch` sees each row's state."""
+    """Let the mud in until the course ends; `watch` sees each row's state.
+
+    Raises FlowError where `MOST_STEPS` do not reach the end.
+    """
     solids, pores = no_solids(sieve, classes), float(sieve.void.sum())
     kept, rows, by_class, time, filtrate = np.ones(sieve.ends.shape), [], [], 0.0, 0.0
     wanted, quiet, reason, mud = FIRST_STEP * pores, 0.0, "", float(classes.concentration.sum())
@@ -264,12 +268,14 @@ def invade_classes(
         del loose, after
         state = flow_with(kept, state.flow)
         reason = _ended(course, time, quiet, float(solids.supplied.sum()))
+    else:
+        raise FlowError(
+            f"size classes: {MOST_STEPS} steps reached {1e3 * time:.3g} of at most "
+            f"{1e3 * (course.duration or course.cap_time):.3g} ms; raise run.plug_time_ms or "
+            "invasion.release_time_s where they are short, or end it by a shorter run.duration_ms"
+        )
     return ClassInvasion(
-        solids=solids,
-        kept=kept,
-        rows=tuple(rows),
-        by_class=np.array(by_class),
-        stop_reason=reason or "cap",
+        solids=solids, kept=kept, rows=tuple(rows), by_class=np.array(by_class), stop_reason=reason
     )
 
 
