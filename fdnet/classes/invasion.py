@@ -6,6 +6,7 @@ length of a step is that in which the resistance of the pack changes by `CHANGE`
 that the fluid passes.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -100,6 +101,8 @@ class Course:
     plug_rate: float  # share of the first supply that may enter while the face counts as plugged
     plug_time: float  # s, for which that must hold
     cap_time: float  # s, when the invasion ends at the latest
+    stop_rate: float = 0.0  # share of the first velocity below which the face is plugged
+    stop_volume: float = math.inf  # m3 of filtrate, with which it ends
     supply: float  # m3 of solids that come at most
     sticking: float  # share of contacts with grains that stick
     release: Release | None  # what the flow lifts; None: nothing
@@ -229,14 +232,15 @@ def invade_classes(
             }
         )
         watch(len(rows) - 1, solids, state.flow)
-        reason = reason or ("plugged" if velocity <= 0 else "")
+        least = course.stop_rate * course.velocity
+        reason = reason or ("plugged" if velocity <= 0 or velocity < least else "")
         if reason:
             break
         bed = replace(course.bed, velocity=velocity)
         filtering = filter_coefficient(classes, bed, course.sticking)
         first = holding(sieve, solids, classes, state.streams, filtering)
         rate, bounds = velocity * sieve.area, [max(0.5 * pores, 0.1 * filtrate)]
-        bounds.append((course.supply - supplied) / mud)
+        bounds += [(course.supply - supplied) / mud, course.stop_volume - filtrate]
         bounds.append(((course.duration or course.cap_time) - time) * rate)
         if course.duration is None:
             bounds.append(0.25 * course.plug_time * rate)
@@ -268,6 +272,8 @@ def invade_classes(
         del loose, after
         state = flow_with(kept, state.flow)
         reason = _ended(course, time, quiet, float(solids.supplied.sum()))
+        if not reason and filtrate >= (1.0 - 1e-9) * course.stop_volume:
+            reason = "duration"
     else:
         raise FlowError(
             f"size classes: {MOST_STEPS} steps reached {1e3 * time:.3g} of at most "

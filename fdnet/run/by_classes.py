@@ -124,6 +124,8 @@ def class_model(
         plug_rate=run.plug_rate,
         plug_time=scales.plug_time * physical,
         cap_time=scales.cap_time * physical,
+        stop_rate=run.stop_rate or 0.0,
+        stop_volume=(run.stop_pore_volumes or math.inf) * scales.porosity * math.prod(case.size_m),
         supply=math.inf
         if fines.endless and run.duration_s is not None
         else scales.supplied_count * fines.mean_volume_m3 / fines.curve.kept,

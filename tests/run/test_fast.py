@@ -71,6 +71,19 @@ def test_the_number_of_the_api_is_that_of_the_cake(fast):
     assert 1e6 * 45.8e-4 * np.sqrt(by_hand) == pytest.approx(5.0, rel=1e-9)
 
 
+def test_what_the_case_says_of_the_flow_ends_a_fast_run_too(fast):
+    """The rate below which the face is plugged, and the volumes of the pores that pass."""
+    scales, grains = invasion_scales(fast.case), fast.spheres("initial")
+    pores = scales.porosity * np.prod(fast.case.size_m)
+    for key, said in (("stop_rate=0.9", "plugged"), ("stop_pore_volumes=0.01", "duration")):
+        model = class_model(tiny(*FAST, f"run.{key}"), scales, grains)
+        end = invade_classes(model.sieve, model.classes, model.course, model.flow)
+        assert end.stop_reason == said
+        before, last = (row["rate_over_initial"] for row in end.rows[-2:])
+        assert last < 0.9 <= before if said == "plugged" else last > 0.9
+    assert end.rows[-1]["filtrate_m3"] == pytest.approx(0.01 * pores, rel=1e-9)
+
+
 def test_a_killed_run_goes_on_from_the_pack_to_the_same_bits(fast, tmp_path):
     """Without LIGGGHTS."""
     again = tmp_path / "again"
