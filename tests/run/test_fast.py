@@ -10,6 +10,7 @@ import pytest
 from builders import tiny
 
 from fdnet import build_network, solve_flow
+from fdnet.classes import invasion
 from fdnet.classes.invasion import cake_permeability, invade_classes
 from fdnet.cli import main
 from fdnet.errors import CaseError, FlowError
@@ -24,6 +25,7 @@ from fdnet.run.by_classes import (
     read_classes,
     states_on_the_way,
     watch,
+    write_class_invasion,
 )
 from fdnet.run.finished import open_run
 from fdnet.run.movie import fluxes_of, states_of
@@ -82,6 +84,13 @@ def test_what_the_case_says_of_the_flow_ends_a_fast_run_too(fast):
         before, last = (row["rate_over_initial"] for row in end.rows[-2:])
         assert last < 0.9 <= before if said == "plugged" else last > 0.9
     assert end.rows[-1]["filtrate_m3"] == pytest.approx(0.01 * pores, rel=1e-9)
+
+
+def test_a_fast_run_of_too_many_steps_is_refused_and_not_cut(fast, tmp_path, monkeypatch):
+    monkeypatch.setattr(invasion, "MOST_STEPS", 3)
+    model = class_model(fast.case, invasion_scales(fast.case), fast.spheres("initial"))
+    with pytest.raises(FlowError, match=r"3 steps reached .* of at most .* ms; raise run.plug"):
+        write_class_invasion(model, tmp_path / "invade")
 
 
 def test_a_killed_run_goes_on_from_the_pack_to_the_same_bits(fast, tmp_path):
