@@ -155,8 +155,8 @@ def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
     if not end.stop_reason:
         raise FlowError(
             f"size classes: {len(end.rows)} steps reached {1e3 * end.rows[-1]['time_s']:.3g} of "
-            f"at most {1e3 * (course.duration or course.cap_time):.3g} ms; raise run.plug_time_ms or "
-            "invasion.release_time where they are short, or end it by a shorter run.duration_ms"
+            f"at most {1e3 * (course.duration or course.cap_time):.3g} ms; raise run.plug_time_ms "
+            "or invasion.release_time where they are short, or give a shorter run.duration_ms"
         )
     counts = model.counted(end.by_class)
     arrays = {one.name: getattr(end.solids, one.name) for one in fields(end.solids)}
