@@ -355,7 +355,7 @@ class Fines(Spheres):
     cut_um: Positive | None = None
     """Diameter of measured sizes below which solids are no spheres: they are size classes with
     invasion.method = "both", else left out, which a warning names."""
-    concentration: Annotated[float, Field(ge=1e-9, le=1)] | None = 0.10
+    concentration: Annotated[float, Field(ge=1e-9)] | None = 0.10
     """Volume of solids over that of the mud, at most 0.3: more do not fit at random places."""
     solids_kg_m3: Positive | None = None
     """Mass of solids over volume of mud, instead of `concentration`."""

@@ -2,9 +2,11 @@
 
 Each step solves the flow with what the deposit left of the throats, carries all classes, and lets
 the deposit grow. What the deposit holds back in a step is what it would in the middle of it. The
-length of a step is that in which the resistance changes by `CHANGE`.
+length of a step is that in which the resistance of the pack changes by `CHANGE`, or that of all
+that the fluid passes.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -34,7 +36,7 @@ from fdnet.scales.flow import api_permeability, carman_kozeny, darcy_through, pa
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.snapshot import Array
 
-CHANGE = 0.1  # Relative change of the resistance of the pack in one step
+CHANGE = 0.1  # Relative change of the resistance of the pack, or of the whole way, in one step
 LEAST_STEP, FIRST_STEP = 1e-6, 0.02
 """m3 of fluid over the pores of the specimen: in the shortest step, and in the first."""
 MOST_STEPS = 5000
@@ -98,6 +100,8 @@ class Course:
     plug_rate: float  # share of the first supply that may enter while the face counts as plugged
     plug_time: float  # s, for which that must hold
     cap_time: float  # s, when the invasion ends at the latest
+    stop_rate: float = 0.0  # share of the first velocity below which the face is plugged
+    stop_volume: float = math.inf  # m3 of filtrate, with which it ends
     supply: float  # m3 of solids that come at most
     sticking: float  # share of contacts with grains that stick
     release: Release | None  # what the flow lifts; None: nothing
@@ -131,7 +135,7 @@ class ClassInvasion:
     kept: Array  # (T, 2) share of its conductance that each side of a throat keeps
     rows: tuple[Mapping[str, float], ...]  # one a step: time, rate, filtrate, solids, cake
     by_class: Array  # (S, 3, C) m3 inside, passed and in the cake at each of these steps
-    # "plugged", "duration", "supply_exhausted" or "cap"; "" where it is not asked
+    # "plugged", "duration", "supply_exhausted" or "cap"; "" where `MOST_STEPS` did not reach it
     stop_reason: str = ""
 
 
@@ -198,6 +202,7 @@ def invade_classes(
     for _ in range(MOST_STEPS):
         cake = cake_resistance(course.cake_permeability, sieve, solids, classes)
         velocity = course.velocity
+        beyond = 1.0 / max(state.k_over_k0, 1e-300) + course.rest
         if not course.at_rate:
             more = cake / course.resistance
             velocity = velocity_in(velocity, course.rest, state.k_over_k0, more)
@@ -223,14 +228,15 @@ def invade_classes(
             }
         )
         watch(len(rows) - 1, solids, state.flow)
-        reason = reason or ("plugged" if velocity <= 0 else "")
+        least = course.stop_rate * course.velocity
+        reason = reason or ("plugged" if velocity <= 0 or velocity < least else "")
         if reason:
             break
         bed = replace(course.bed, velocity=velocity)
         filtering = filter_coefficient(classes, bed, course.sticking)
         first = holding(sieve, solids, classes, state.streams, filtering)
         rate, bounds = velocity * sieve.area, [max(0.5 * pores, 0.1 * filtrate)]
-        bounds.append((course.supply - supplied) / mud)
+        bounds += [(course.supply - supplied) / mud, course.stop_volume - filtrate]
         bounds.append(((course.duration or course.cap_time) - time) * rate)
         if course.duration is None:
             bounds.append(0.25 * course.plug_time * rate)
@@ -245,6 +251,9 @@ def invade_classes(
             after = advanced(sieve, loose, classes, streams, middle, volume)
             new = kept_shares(sieve, after, classes)
             change = _change(sieve, state.energy, kept, new)
+            if not course.at_rate:  # the rate falls with the cake too
+                grown = cake_resistance(course.cake_permeability, sieve, after, classes) - cake
+                change = max(change, grown / (cake + course.resistance * beyond))
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
                 break
             volume *= max(0.2, CHANGE / change)
@@ -259,12 +268,10 @@ def invade_classes(
         del loose, after
         state = flow_with(kept, state.flow)
         reason = _ended(course, time, quiet, float(solids.supplied.sum()))
+        if not reason and filtrate >= (1.0 - 1e-9) * course.stop_volume:
+            reason = "duration"
     return ClassInvasion(
-        solids=solids,
-        kept=kept,
-        rows=tuple(rows),
-        by_class=np.array(by_class),
-        stop_reason=reason or "cap",
+        solids=solids, kept=kept, rows=tuple(rows), by_class=np.array(by_class), stop_reason=reason
     )
 
 

@@ -129,7 +129,7 @@ def kept_by(run: FinishedRun) -> Array:
 
 def _rested(run: FinishedRun, case: InvasionCase) -> list[Rested]:
     """The spheres as one kind, then each class of the network."""
-    classes = rested_classes(run, case) if case.by_classes or case.with_classes else []
+    classes = rested_classes(run, case) if "method" in run.summary else []
     if case.by_classes:
         return classes
     fines = run.spheres().fines()
@@ -433,10 +433,12 @@ def _banded(
     """What the model gives for all that is handed up, with bands: of seeds, or of the fits."""
     many = hand_up(source, api_filtrate=api_filtrate)
     seeds = len({one.run.path for one in many})
-    found = _merged([by_model(one.medium, one.run.case) for one in many], seeds)
+    each = [by_model(one.medium, one.run.case) for one in many]
     notes = [note for one in many for note in one.notes]
-    if stopped := found.pop("stopped"):
-        notes.append(f"{stopped}: the numbers are those of that time; give --api-filtrate")
+    for stopped in filter(None, (one.pop("stopped") for one in each)):
+        what = "" if api_filtrate else "; give --api-filtrate"
+        notes.append(f"{stopped}: the numbers are those of that time{what}")
+    found = _merged(each, seeds)
     return found | {"seeds": seeds, "warnings": list(dict.fromkeys(notes))}
 
 

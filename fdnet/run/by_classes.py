@@ -124,6 +124,8 @@ def class_model(
         plug_rate=run.plug_rate,
         plug_time=scales.plug_time * physical,
         cap_time=scales.cap_time * physical,
+        stop_rate=run.stop_rate or 0.0,
+        stop_volume=(run.stop_pore_volumes or math.inf) * scales.porosity * math.prod(case.size_m),
         supply=math.inf
         if fines.endless and run.duration_s is not None
         else scales.supplied_count * fines.mean_volume_m3 / fines.curve.kept,
@@ -143,10 +145,19 @@ def class_model(
 
 # ---- The stage: what it writes, and its record.
 def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
-    """Let the mud in, write what is left of it into `folder`, and return the stage's record."""
+    """Let the mud in, write what is left of it into `folder`, and return the stage's record.
+
+    Raises FlowError where the steps of the model do not reach the end.
+    """
     seen: dict[int, dict[str, Array]] = {}
     see, course = partial(watch, seen), model.course
     end = invade_classes(model.sieve, model.classes, course, model.flow, watch=see)
+    if not end.stop_reason:
+        raise FlowError(
+            f"size classes: {len(end.rows)} steps reached {1e3 * end.rows[-1]['time_s']:.3g} of "
+            f"at most {1e3 * (course.duration or course.cap_time):.3g} ms; raise run.plug_time_ms "
+            "or invasion.release_time where they are short, or give a shorter run.duration_ms"
+        )
     counts = model.counted(end.by_class)
     arrays = {one.name: getattr(end.solids, one.name) for one in fields(end.solids)}
     arrays |= {f"row_{key}": np.array([row[key] for row in end.rows]) for key in end.rows[0]}

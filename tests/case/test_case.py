@@ -58,7 +58,7 @@ def test_a_bad_value_is_named_with_its_path():
     for part, values, expected in [
         ("fines", {"radius_mm": 0.3}, "expected below grains.radius_mm 0.25"),
         ("fines", {"slab_mm": 2.0}, "give one of the two, or none"),
-        ("fines", {"concentration": 0.4}, "fines.concentration: 0.4"),
+        ("fines", {"concentration": 40.0}, "a mass of solids goes to fines.solids"),
         ("fines", {"concentration": 5e-324}, "or equal to 0.000000001"),
         ("grains", {"radius_mm": [0.3, 0.2]}, "must rise"),
         ("grains", {"count": 0}, "grains.count: 0"),

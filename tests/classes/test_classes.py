@@ -282,6 +282,13 @@ def test_a_class_wider_than_every_throat_stays_at_the_face():
     assert end.stop_reason == "plugged"
     assert end.solids.cake[0] > 0
     assert not np.any(end.solids.in_pores[~sieve.inlet])
+    # a tight one slows the flow by the law of its own growth, in which 1 / q rises evenly with V
+    tight = course(sieve, supply=np.inf, cake_permeability=1e-7, duration=1e6)
+    rows = invade_classes(sieve, widest, tight, flow).rows
+    rate, volume = (np.array([row[key] for row in rows]) for key in ("rate_m3_s", "filtrate_m3"))
+    slower = np.diff(volume) @ (1.0 / rate[1:] + 1.0 / rate[:-1]) / 2.0
+    assert rate[-1] < 2e-3 * rate[0]
+    assert rows[-1]["time_s"] == pytest.approx(slower, rel=0.08)
 
 
 def test_a_tenth_of_the_step_hardly_changes_the_permeability(monkeypatch):

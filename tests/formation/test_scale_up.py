@@ -176,6 +176,10 @@ def test_classes_of_the_network_are_handed_up_each_by_its_own_profile(keys, tmp_
     assert core_flood(run, length=0.05, rate=1e-8)["sections"][0]["k_over_k0"] < 0.999
 
 
+def test_both_without_finer_solids_hands_up_its_spheres(finished):
+    assert len(scale_up._rested(finished, tiny(*BOTH))) == 1
+
+
 def closed(run):
     """The run as if its face had closed, with a cake of 1 mm."""
     cake = {"packed_thickness_m": 1e-3, "resistance_1_m": 2e7, "porosity": 0.5, "k_m2": 5e-11}
@@ -205,8 +209,9 @@ def test_a_well_has_the_skin_of_its_run(finished):
     assert found["invasion_radius_m"] == pytest.approx(radius, rel=1e-3)
     wide = well_invasion(closed(finished), hours=1.0, pressure=2e6, radius=50.0, api_filtrate=8e-6)
     assert wide["skin"] < found["skin"] / 100
-    alone = well_invasion(closed(finished), hours=1.0, pressure=2e6)
-    assert any("fills the hole" in one for one in alone["warnings"])
+    for api, said in ((None, "of that time; give --api-filtrate"), (8e-6, "of that time")):
+        full = well_invasion(closed(finished), hours=1e7, pressure=2e6, api_filtrate=api)
+        assert full["warnings"][-1].endswith(f"alone fills the hole: the numbers are those {said}")
 
 
 def test_the_commands_keep_numbers_figure_and_section(finished, tmp_path, capsys):

@@ -10,6 +10,7 @@ import pytest
 from builders import tiny
 
 from fdnet import build_network, solve_flow
+from fdnet.classes import invasion
 from fdnet.classes.invasion import cake_permeability, invade_classes
 from fdnet.cli import main
 from fdnet.errors import CaseError, FlowError
@@ -24,6 +25,7 @@ from fdnet.run.by_classes import (
     read_classes,
     states_on_the_way,
     watch,
+    write_class_invasion,
 )
 from fdnet.run.finished import open_run
 from fdnet.run.movie import fluxes_of, states_of
@@ -69,6 +71,26 @@ def test_the_number_of_the_api_is_that_of_the_cake(fast):
     assert fast.summary["api_filtrate_mL"] == pytest.approx(5.0, rel=1e-12)
     by_hand = 2 * cake_permeability(fast.case) * 690e3 * 1800 * (1 - 0.4 - 0.1) / (0.05 * 0.1)
     assert 1e6 * 45.8e-4 * np.sqrt(by_hand) == pytest.approx(5.0, rel=1e-9)
+
+
+def test_what_the_case_says_of_the_flow_ends_a_fast_run_too(fast):
+    """The rate below which the face is plugged, and the volumes of the pores that pass."""
+    scales, grains = invasion_scales(fast.case), fast.spheres("initial")
+    pores = scales.porosity * np.prod(fast.case.size_m)
+    for key, said in (("stop_rate=0.9", "plugged"), ("stop_pore_volumes=0.01", "duration")):
+        model = class_model(tiny(*FAST, f"run.{key}"), scales, grains)
+        end = invade_classes(model.sieve, model.classes, model.course, model.flow)
+        assert end.stop_reason == said
+        before, last = (row["rate_over_initial"] for row in end.rows[-2:])
+        assert last < 0.9 <= before if said == "plugged" else last > 0.9
+    assert end.rows[-1]["filtrate_m3"] == pytest.approx(0.01 * pores, rel=1e-9)
+
+
+def test_a_fast_run_of_too_many_steps_is_refused_and_not_cut(fast, tmp_path, monkeypatch):
+    monkeypatch.setattr(invasion, "MOST_STEPS", 3)
+    model = class_model(fast.case, invasion_scales(fast.case), fast.spheres("initial"))
+    with pytest.raises(FlowError, match=r"3 steps reached .* of at most .* ms; raise run.plug"):
+        write_class_invasion(model, tmp_path / "invade")
 
 
 def test_a_killed_run_goes_on_from_the_pack_to_the_same_bits(fast, tmp_path):
