@@ -202,7 +202,6 @@ def invade_classes(
     for _ in range(MOST_STEPS):
         cake = cake_resistance(course.cake_permeability, sieve, solids, classes)
         velocity = course.velocity
-        beyond = 1.0 / max(state.k_over_k0, 1e-300) + course.rest
         if not course.at_rate:
             more = cake / course.resistance
             velocity = velocity_in(velocity, course.rest, state.k_over_k0, more)
@@ -252,6 +251,7 @@ def invade_classes(
             new = kept_shares(sieve, after, classes)
             change = _change(sieve, state.energy, kept, new)
             if not course.at_rate:  # the rate falls with the cake too
+                beyond = 1.0 / max(state.k_over_k0, 1e-300) + course.rest
                 grown = cake_resistance(course.cake_permeability, sieve, after, classes) - cake
                 change = max(change, grown / (cake + course.resistance * beyond))
             if change <= 2.0 * CHANGE or volume <= LEAST_STEP * pores:
@@ -267,9 +267,7 @@ def invade_classes(
         solids, kept = after, new
         del loose, after
         state = flow_with(kept, state.flow)
-        reason = _ended(course, time, quiet, float(solids.supplied.sum()))
-        if not reason and filtrate >= (1.0 - 1e-9) * course.stop_volume:
-            reason = "duration"
+        reason = _ended(course, time, filtrate, quiet, float(solids.supplied.sum()))
     return ClassInvasion(
         solids=solids, kept=kept, rows=tuple(rows), by_class=np.array(by_class), stop_reason=reason
     )
@@ -282,7 +280,7 @@ def _change(sieve: Sieve, energy: Array, before: Array, after: Array) -> float:
     return float(np.sum(energy * np.abs(1.0 - 1.0 / np.maximum(grown, 1e-12))))
 
 
-def _ended(course: Course, time: float, quiet: float, supplied: float) -> str:
+def _ended(course: Course, time: float, filtrate: float, quiet: float, supplied: float) -> str:
     """Why the invasion ends now; "" where it goes on."""
     near, given = 1.0 - 1e-9, course.duration is not None
     if not given and quiet >= near * course.plug_time:
@@ -291,7 +289,7 @@ def _ended(course: Course, time: float, quiet: float, supplied: float) -> str:
         return "supply_exhausted"
     if time >= near * (course.duration or course.cap_time):
         return "duration" if given else "cap"
-    return ""
+    return "duration" if filtrate >= near * course.stop_volume else ""
 
 
 def cake_permeability(case: InvasionCase) -> float | None:
