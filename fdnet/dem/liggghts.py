@@ -404,7 +404,8 @@ class Feed:
         pipe = self.process.stdout.fileno()
         while not select.select([pipe], [], [], _PATIENCE)[0]:
             self._refuse()
-            if self._ended():  # a daemon of MPI may keep the pipe open
+            # a daemon of MPI may keep the pipe open; the last words may have come just now
+            if self._ended() and not select.select([pipe], [], [], 0.0)[0]:
                 raise _EndedError
         self.peak_memory_bytes = max(self.peak_memory_bytes, peak_resident_bytes(self.process.pid))
         part = os.read(pipe, _PART)

@@ -62,6 +62,14 @@ def test_a_whole_run_is_a_run_and_its_lines_are_followed_whole(fake, tmp_path):
     assert lines[-3:] == ["one line in two parts", "   100   20   1.5", "DECK_DONE"]
 
 
+def test_what_is_printed_while_the_end_is_looked_for_is_read(fake, tmp_path, monkeypatch):
+    late = process.Feed._ended
+    monkeypatch.setattr(process.Feed, "_ended", lambda feed: time.sleep(0.5) or late(feed))
+    monkeypatch.setattr(process, "_PATIENCE", 0.05)
+    run(fake, tmp_path, "slowly", follow=(lines := list[str]()).append)
+    assert lines[-1] == "DECK_DONE"
+
+
 def test_failures_are_reported_with_their_evidence(fake, tmp_path):
     for mode, message in {
         "exit1": r"exit 1\): ERROR: Unknown command: nonsense",
