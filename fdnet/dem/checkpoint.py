@@ -356,11 +356,12 @@ def time_of(row: Checkpoint, scales: InvasionScales) -> float:
 # deposit: steps of a chunk go with the root of the stiffness, so history.csv records it.
 
 
-RAISE_ABOVE, RAISE_TO, MOST_RAISE = 0.67, 0.6, 2.0
-"""Shares of `PRESSED`: springs are stiffened at a checkpoint when the overlap that lasted in the
-chunk before was above the first and more than before, so that it would have been the second. At
-most so many times the steps at once. A fine that is wedged between grains keeps its overlap with
-stiffer springs too."""
+RAISE_ABOVE, RAISE_TO, GROWN, MOST_RAISE = 0.67, 0.6, 1.1, 2.0
+"""Springs are stiffened at a checkpoint when the overlap that lasted in the chunk before was above
+the first share of `PRESSED`, so that it would have been the second. At most so many times the
+steps at once. A fine that is wedged between grains keeps its overlap with stiffer springs too, and
+is watched only with some grains in a chunk: so the overlap must be `GROWN` times that of any
+chunk before."""
 
 
 def lasting_overlap(seen: Sequence[float]) -> float:
@@ -368,13 +369,13 @@ def lasting_overlap(seen: Sequence[float]) -> float:
     return sorted(seen)[math.ceil(9 * (len(seen) - 1) / 10)]
 
 
-def steps_after(case: InvasionCase, steps: int, overlap: float, before: float = 0.0) -> int:
-    """Steps of the chunk after one of `steps` steps with an `overlap` that lasted.
+def steps_after(case: InvasionCase, steps: int, lasted: Sequence[float]) -> int:
+    """Steps of the chunk after one of `steps` steps; an overlap `lasted` in it and each before it.
 
-    In the chunk `before` it was another. It goes with the stiffness k to the power -1 (Hertz
-    -2/3), the step with k to -1/2.
+    It goes with the stiffness k to the power -1 (Hertz -2/3), the step with k to -1/2.
     """
-    if not rises(case) or overlap <= max(before, RAISE_ABOVE * PRESSED):
+    overlap, before = lasted[-1], max(lasted[:-1], default=0.0)
+    if not rises(case) or overlap <= max(GROWN * before, RAISE_ABOVE * PRESSED):
         return steps
     power = 0.75 if case.contact.model == "hertz" else 0.5
     return math.ceil(steps * min(MOST_RAISE, (overlap / (RAISE_TO * PRESSED)) ** power))
