@@ -359,9 +359,9 @@ def time_of(row: Checkpoint, scales: InvasionScales) -> float:
 RAISE_ABOVE, RAISE_TO, GROWN, MOST_RAISE = 0.67, 0.6, 1.1, 2.0
 """Springs are stiffened at a checkpoint when the overlap that lasted in the chunk before was above
 the first share of `PRESSED`, so that it would have been the second. At most so many times the
-steps at once. A fine that is wedged between grains keeps its overlap with stiffer springs too, and
-is watched only with some grains in a chunk: so the overlap must be `GROWN` times that of any
-chunk before."""
+steps at once. A fine that is wedged between grains keeps its overlap with stiffer springs too: so
+the overlap must be `GROWN` times the largest of the first chunks with the present springs, in
+which each group of grains was watched. Until then what they were stiffened for counts as well."""
 
 
 def lasting_overlap(seen: Sequence[float]) -> float:
@@ -369,16 +369,23 @@ def lasting_overlap(seen: Sequence[float]) -> float:
     return sorted(seen)[math.ceil(9 * (len(seen) - 1) / 10)]
 
 
-def steps_after(case: InvasionCase, steps: int, lasted: Sequence[float]) -> int:
-    """Steps of the chunk after one of `steps` steps; an overlap `lasted` in it and each before it.
+def steps_after(
+    case: InvasionCase, steps: Sequence[int], lasted: Sequence[float], groups: int
+) -> int:
+    """Steps of the chunk after some of so many `steps`, in each of which an overlap `lasted`.
 
-    It goes with the stiffness k to the power -1 (Hertz -2/3), the step with k to -1/2.
+    It goes with the stiffness k to the power -1 (Hertz -2/3), the step with k to -1/2. Each chunk
+    watches the next of the `groups` of grains.
     """
-    overlap, before = lasted[-1], max(lasted[:-1], default=0.0)
-    if not rises(case) or overlap <= max(GROWN * before, RAISE_ABOVE * PRESSED):
-        return steps
+    others = [chunk for chunk, one in enumerate(steps) if one != steps[-1]]
+    first = others[-1] + 1 if others else 0
+    asked = first > 0 and len(steps) <= first + groups
+    known = lasted[first - asked : min(first + groups, len(steps) - 1)]
+    least = max(GROWN * max(known, default=0.0), RAISE_ABOVE * PRESSED)
+    if not rises(case) or lasted[-1] <= least:
+        return steps[-1]
     power = 0.75 if case.contact.model == "hertz" else 0.5
-    return math.ceil(steps * min(MOST_RAISE, (overlap / (RAISE_TO * PRESSED)) ** power))
+    return math.ceil(steps[-1] * min(MOST_RAISE, (lasted[-1] / (RAISE_TO * PRESSED)) ** power))
 
 
 # ---- The states of checkpoints, from their dumps.

@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from fdnet.files import disk_is_full, write_text
 from fdnet.scales.clock import ARRIVALS, rises
 from fdnet.scales.scales import InvasionScales, stiffened
 from fdnet.spheres.dump import Frame
+from fdnet.spheres.geometry import groups_apart
 from fdnet.spheres.snapshot import Snapshot
 
 _START_OF_SCREEN = 1 << 20
@@ -259,6 +261,12 @@ class InvadeStage(ChunkedStage):
         """By the step of a checkpoint the overlap that lasted in its chunk."""
         return {}
 
+    @cached_property
+    def _turns(self) -> int:
+        """In so many chunks fines are watched with all grains once; dumps show all at once."""
+        watched = checkpoint.is_watched(self.case)
+        return int(groups_apart(self.grains, self.case.periodic).max()) if watched else 1
+
     def write(self, last: Checkpoint | None) -> Deck:
         """Write the inputs of a start, or of a restart from `last`."""
         ranks = self.launch.ranks
@@ -293,7 +301,8 @@ class InvadeStage(ChunkedStage):
         rows = [row for row in checkpoint.read_rows(self.folder) if row.chunk <= last.chunk]
         ends = [0, *(row.step for row in rows)]
         lasted = [self._lasted(since, row) for since, row in zip(ends, rows, strict=False)]
-        return stiffened(case, scales, checkpoint.steps_after(case, ends[-1] - ends[-2], lasted))
+        steps = [end - begin for begin, end in pairwise(ends)]
+        return stiffened(case, scales, checkpoint.steps_after(case, steps, lasted, self._turns))
 
     def _lasted(self, since: int, row: Checkpoint) -> float:
         """The overlap that lasted from the step `since` to a checkpoint."""
