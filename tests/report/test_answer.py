@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fdnet.case.tables import Run
 from fdnet.report.tables import MILLIDARCY, in_millidarcy, percent
-from fdnet.report.text import answer_sentence, facts, in_place_words
+from fdnet.report.text import answer_sentence, end_words, facts, in_place_words
 from fdnet.run.answer import (
     FOLLOWED,
     FULL,
@@ -199,6 +200,14 @@ def test_the_loss_at_the_face_is_that_of_the_layers_in_series():
     before, after = 1.0 / (1 / 2 + 0.5 / 4), 1.0 / (1 / 0.5 + 0.5 / 2)
     assert face_loss(steps, 1.5e-3) == (pytest.approx(1 - after / before), 1.5e-3)
     assert face_loss(steps[:1], 1.5e-3) == (pytest.approx(0.75), 1e-3)
+
+
+def test_a_plugged_face_says_what_may_still_move():
+    """The fast model knows what crosses the face alone."""
+    for rate, said in ((0.0, "1.0"), (0.05, "5.0"), (0.2, "20.0")):
+        run, end = Run(plug_rate=rate), {"stop_reason": "plugged", "rate_over_initial": 0.3}
+        assert f"no more than {said} % of the fluid's first velocity" in end_words(end, run)
+        assert end_words(end | {"method": "network"}, run).endswith("crossed it for the set time")
 
 
 DAMAGE = {"zone_depth_m": 2e-3, "zone_k_over_k0": 0.34, "reaches_the_end": False}
