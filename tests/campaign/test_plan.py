@@ -11,6 +11,7 @@ from campaign.samples import finished_run
 
 import fdnet
 from fdnet import CaseError, read_case
+from fdnet.campaign import engine
 from fdnet.campaign.plan import sweep_plan
 from fdnet.cli import main
 from fdnet.run.pipeline import refusals
@@ -48,10 +49,13 @@ def planned(path: Path) -> tuple[dict, dict]:
     return plan, {name: read_case(out / f"cases/{name}.toml") for name in names}
 
 
-def test_a_dry_run_says_the_time_and_writes_nothing(write, tmp_path, capsys):
+def test_a_dry_run_says_the_time_and_writes_nothing(write, tmp_path, capsys, monkeypatch):
+    """It refuses what the run would: a resource without a value, and a missing Snakemake."""
     path = write(GRID)
-    words = ["sweep", str(path), "--out", str(tmp_path / "out"), "--dry-run"]
-    assert main([*words, "--jobs", "3", "--slurm", "runtime=60"]) == 0
+    words = ["sweep", str(path), "--out", str(tmp_path / "out"), "--dry-run", "--jobs", "3"]
+    for find, resource, code in ((str, "x", 2), ({}.get, "mem=1", 2), (str, "runtime=60", 0)):
+        monkeypatch.setattr(engine, "find_spec", find)
+        assert main([*words, "--slurm", resource]) == code
     said = capsys.readouterr().out.splitlines()
     assert len(said) == 8
     assert said[-2].startswith("12 runs: ")
