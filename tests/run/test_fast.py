@@ -86,11 +86,16 @@ def test_what_the_case_says_of_the_flow_ends_a_fast_run_too(fast):
     assert end.rows[-1]["filtrate_m3"] == pytest.approx(0.01 * pores, rel=1e-9)
 
 
-def test_a_fast_run_of_too_many_steps_is_refused_and_not_cut(fast, tmp_path, monkeypatch):
-    monkeypatch.setattr(invasion, "MOST_STEPS", 3)
-    model = class_model(fast.case, invasion_scales(fast.case), fast.spheres("initial"))
-    with pytest.raises(FlowError, match=r"3 steps reached .* of at most .* ms; raise run.plug"):
-        write_class_invasion(model, tmp_path / "invade")
+def test_a_fast_run_of_too_many_steps_or_too_few_fines_is_refused(fast, tmp_path, monkeypatch):
+    few = "fines={sizes={D10_mm=0.04,D50_mm=0.07,D90_mm=0.1},count=2,concentration=0.1}"
+    for case, steps, error, said in (
+        (tiny(*FAST, few), 5000, CaseError, r"2.1 fines in 8 classes, .* raise fines.count"),
+        (fast.case, 3, FlowError, r"3 steps reached .* of at most .* ms; raise run.plug"),
+    ):
+        monkeypatch.setattr(invasion, "MOST_STEPS", steps)
+        model = class_model(case, invasion_scales(case), fast.spheres("initial"))
+        with pytest.raises(error, match=said):
+            write_class_invasion(model, tmp_path / "invade")
 
 
 def test_a_killed_run_goes_on_from_the_pack_to_the_same_bits(fast, tmp_path):
