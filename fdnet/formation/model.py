@@ -174,8 +174,8 @@ def march(
                 break
             if after.deposit.min() < 0:
                 raise FlowError(
-                    f"a deposit of {after.deposit.min():.2g} of the volume, expected 0 or more: it "
-                    f"grows too fast for steps of fineness {fineness:g}; give a smaller one"
+                    f"a deposit of {after.deposit.min():.2g} of the volume, expected 0 or more: "
+                    f"it grows too fast for steps of fineness {fineness:g}; give a smaller one"
                 )
             left = end - time - seconds
             time = end if left < TINY * drive.seconds else time + seconds
