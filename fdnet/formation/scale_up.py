@@ -88,6 +88,7 @@ class HandedUp(NamedTuple):
     x: Array  # (F,) m, even depths of the specimen
     fitted: Array  # (F,) deposit there, by the fit
     notes: tuple[str, ...]  # what could not be told, and what was assumed
+    api_filtrate: float | None  # m3, that the cake is known by
 
 
 def hand_up(
@@ -167,7 +168,7 @@ def _of_run(run: FinishedRun, api_filtrate: float | None, draws: int) -> list[Ha
     x = (np.arange(PLACES) + 0.5) * (length / PLACES)
     if found < FEWEST:
         notes.append(f"only {found} fines entered before the face closed: all is cake")
-        return [HandedUp(run, medium, x, 0.0 * x, tuple(notes))]
+        return [HandedUp(run, medium, x, 0.0 * x, tuple(notes), api_filtrate)]
     if few := [one.name for one in kinds if one.number < FEWEST]:
         notes.append(
             f"too little of the fines of {', '.join(few)} rests inside for more than one number: "
@@ -194,7 +195,7 @@ def _of_run(run: FinishedRun, api_filtrate: float | None, draws: int) -> list[Ha
         harm, error = fit_damage(kept[paths], fitted, share)
         damage = math.exp(harm + (error * sample.standard_normal() if sample else 0.0))
         own = replace(medium, damage=damage, rate=rate, growth=np.expm1(g) / face, closing=face)
-        many.append(HandedUp(run, own, x, fitted, tuple(notes)))
+        many.append(HandedUp(run, own, x, fitted, tuple(notes), api_filtrate))
     return many
 
 
@@ -246,8 +247,11 @@ def _without_filtration(
 
 
 # ---- A core and a well.
+Source = str | Path | FinishedRun | list[HandedUp]
+
+
 def core_flood(
-    source: str | Path | FinishedRun,
+    source: Source,
     *,
     length: float,
     diameter: float = 0.038,
@@ -265,7 +269,7 @@ def core_flood(
     an argument is not above 0, or the specimen cannot tell.
 
     Args:
-        source: a run, its folder, or the folder of an ensemble.
+        source: a run, its folder, the folder of an ensemble, or what `hand_up` gave of it.
         length, diameter: m.
         rate, pressure: m3/s, or Pa over the core and its cake; one of them.
         minutes: of the flood.
@@ -321,7 +325,7 @@ def core_flood(
 
 
 def well_invasion(
-    source: str | Path | FinishedRun,
+    source: Source,
     *,
     hours: float = 12.0,
     pressure: float | None = None,
@@ -426,12 +430,12 @@ def _common(medium: Medium, column: Column, made: March) -> dict[str, Any]:
 
 # ---- Bands, words and files.
 def _banded(
-    source: str | Path | FinishedRun,
-    by_model: Callable[[Medium, Any], dict[str, Any]],
-    api_filtrate: float | None,
+    source: Source, by_model: Callable[[Medium, Any], dict[str, Any]], api_filtrate: float | None
 ) -> dict[str, Any]:
     """What the model gives for all that is handed up, with bands: of seeds, or of the fits."""
-    many = hand_up(source, api_filtrate=api_filtrate)
+    many = source if isinstance(source, list) else hand_up(source, api_filtrate=api_filtrate)
+    if (by := many[0].api_filtrate) != api_filtrate:
+        raise CaseError(f"api_filtrate: {api_filtrate}, expected {by} as it was handed up with")
     seeds = len({one.run.path for one in many})
     each = [by_model(one.medium, one.run.case) for one in many]
     notes = [note for one in many for note in one.notes]
@@ -477,13 +481,19 @@ def _above_zero(**given: float | None) -> None:
             raise CaseError(f"{name}: {value:g}, expected a number above 0")
 
 
-def keep(folder: Path, name: str, found: Mapping[str, Any], given: Mapping[str, Any]) -> None:
+def keep(
+    folder: Path,
+    name: str,
+    found: Mapping[str, Any],
+    given: Mapping[str, Any],
+    handed: Sequence[HandedUp],
+) -> None:
     """Keep the numbers and the fit in `formation` below the folder, and in its report."""
     out, report = folder / FORMATION, folder / "report.html"
     with locked(folder):
         out.mkdir(exist_ok=True)
         write_text(out / f"{name}.json", plain_json({"given": given, **found})[1] + "\n")
-        _draw_fit(hand_up(folder), out / "handed_up.svg")
+        _draw_fit(handed, out / "handed_up.svg")
         if report.is_file():
             put_section(report, FORMATION, formation_html(out))
 

@@ -214,11 +214,14 @@ def test_a_well_has_the_skin_of_its_run(finished):
         assert full["warnings"][-1].endswith(f"alone fills the hole: the numbers are those {said}")
 
 
-def test_the_commands_keep_numbers_figure_and_section(finished, tmp_path, capsys):
-    run = tmp_path / "run"
+def test_the_commands_keep_numbers_figure_and_section(finished, tmp_path, capsys, monkeypatch):
+    """By one hand-up each."""
+    run, seen, of_run = tmp_path / "run", [], scale_up._of_run
+    monkeypatch.setattr(scale_up, "_of_run", lambda *one: seen.append(one) or of_run(*one))
     shutil.copytree(finished.path, run)
     words = ["core", str(run), "--length", "76mm", "--rate", "1ml/min"]
     assert main([*words, "--json"]) == 0
+    assert len(seen) == 1
     found = json.loads(capsys.readouterr().out)
     assert len(found["sections"]) == 4
     assert found["sections"][0]["k_over_k0"] < found["sections"][1]["k_over_k0"]
@@ -242,6 +245,8 @@ def test_the_commands_keep_numbers_figure_and_section(finished, tmp_path, capsys
         with suppress(SystemExit):  # argparse ends by itself
             assert main(["core", str(run), *bad]) == 2
         assert said in capsys.readouterr().err
+    with pytest.raises(CaseError, match="api_filtrate: 8e-06, expected None as it was handed up"):
+        well_invasion(hand_up(finished), api_filtrate=8e-6)
 
 
 def test_of_several_seeds_the_band_is_students():
