@@ -356,8 +356,11 @@ def well_invasion(
         if case.well is not None:
             usual, outer = case.well.radius_m, case.well.drainage_radius_m
         well, over = radius or usual, pressure or case.fluid.overbalance_Pa
-        if well >= outer:
-            raise CaseError(f"radius: {well:g} m, expected below the drainage radius, {outer:g} m")
+        if well + SHOT_LENGTH >= outer:
+            raise CaseError(
+                f"radius: {well:g} m, expected more than {SHOT_LENGTH:g} m, the length of a "
+                f"perforation, below the drainage radius, {outer:g} m"
+            )
         if not over:
             raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
         deep, answers = 20 / min(medium.rate[medium.rate > 0], default=20.0), []

@@ -245,6 +245,8 @@ def test_the_commands_keep_numbers_figure_and_section(finished, tmp_path, capsys
         with suppress(SystemExit):  # argparse ends by itself
             assert main(["core", str(run), *bad]) == 2
         assert said in capsys.readouterr().err
+    with pytest.raises(CaseError, match=r"more than 0.3 m, .* below the drainage radius, 100 m"):
+        well_invasion(hand_up(finished), pressure=2e6, radius=99.8)
     with pytest.raises(CaseError, match="api_filtrate: 8e-06, expected None as it was handed up"):
         well_invasion(hand_up(finished), api_filtrate=8e-6)
 
