@@ -68,7 +68,7 @@ def _finish(name: str, options: argparse.Namespace) -> int:
         print(json.dumps(found, indent=2))
         return 0
     table = found["sections" if name == "core" else "k_over_k0"]
-    keys = [key for key in table[0] if not key.endswith(("_low", "_high"))]
+    keys = [key for key in table[0] if not key.endswith(("_low", "_high", "_of"))]
     rows = [{key: with_band(row, key) for key in keys} for row in table]
     print(*found["words"], "", pd.DataFrame(rows).to_string(index=False), sep="\n")
     for warning in () if options.quiet else found["warnings"]:

@@ -264,9 +264,10 @@ def core_flood(
 ) -> dict[str, Any]:
     """A core of the specimen's sand flooded with its mud; then the flow is turned back.
 
-    It gives numbers in SI by name, with the ends of their 95 % bands as `_low` and `_high`, rows
-    by place, what was `handed_up`, `warnings`, and the answer in `words`. Raises CaseError where
-    an argument is not above 0, or the specimen cannot tell.
+    It gives numbers in SI by name, with the ends of their 95 % bands as `_low` and `_high`, and
+    where some seeds or fits have none, how many have one as `_of`. It gives rows by place, what
+    was `handed_up`, `warnings`, and the answer in `words`. Raises CaseError where an argument is
+    not above 0, or the specimen cannot tell.
 
     Args:
         source: a run, its folder, the folder of an ensemble, or what `hand_up` gave of it.
@@ -452,30 +453,36 @@ def _banded(
 def _merged(trees: Sequence[Any], seeds: int) -> Any:
     """The first of the trees, a number that differs between them with its band.
 
-    The first is that of a single run, and the mean takes its place where there are several.
+    The first is that of a single run, and the mean takes its place where there are several. Where
+    some have no such number, `_of` says how many have one.
     """
     if isinstance(trees[0], list):
         return [_merged(row, seeds) for row in zip(*trees, strict=False)]
     result: dict[str, Any] = {}
-    for key, value in trees[0].items():
-        values = [tree[key] for tree in trees if key in tree]
-        result[key] = _merged(values, seeds) if isinstance(value, dict | list) else value
-        if isinstance(value, float) and None not in values:
-            band, (low, high) = student_band(values), np.percentile(values, (2.5, 97.5)).tolist()
+    for key in dict.fromkeys(key for tree in trees for key in tree):
+        known = [tree[key] for tree in trees if tree.get(key) is not None]
+        value = known[0] if known and seeds > 1 else trees[0].get(key)
+        result[key] = _merged(known, seeds) if isinstance(value, dict | list) else value
+        if isinstance(value, float) and not np.allclose(known, value, 1e-9, 0):
+            low, high = np.percentile(known, (2.5, 97.5)).tolist()
             if seeds > 1:
+                band = student_band(known)
                 value, low, high = band.mean, band.low, band.high
-            if not np.allclose(values, value, 1e-9, 0):
-                result |= {key: value, f"{key}_low": low, f"{key}_high": high}
+            result |= {key: value, f"{key}_low": low, f"{key}_high": high}
+        if 0 < len(known) < len(trees):
+            whose = "seeds" if seeds > 1 else "fits"
+            result[f"{key}_of"] = f"{len(known)} of {len(trees)} {whose}"
     return result
 
 
 def with_band(row: Mapping[str, Any], key: str) -> str:
-    """The number of a row with its band; a share in percent."""
+    """The number of a row with its band, and of whom it is; a share in percent."""
     share = key.endswith(("_over_k0", "_lost"))
     values = [row[key], row.get(f"{key}_low"), row.get(f"{key}_high")]
     one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.3g}" for v in values)
-    unit = " %" if share else ""
-    return f"{one}{unit}" if None in band else f"{one}{unit} ({band[0]} to {band[1]}{unit})"
+    unit, of = " %" if share else "", f", {row[f'{key}_of']}" if f"{key}_of" in row else ""
+    ends = "" if None in band else f" ({band[0]} to {band[1]}{unit})"
+    return f"{one}{unit}{ends}{of}"
 
 
 def _above_zero(**given: float | None) -> None:

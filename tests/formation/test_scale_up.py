@@ -253,10 +253,14 @@ def test_the_commands_keep_numbers_figure_and_section(finished, tmp_path, capsys
 
 def test_of_several_seeds_the_band_is_students():
     rows = [
-        {"a": 1.0, "b": {"c": 2.0}, "d": [{"e": 1.0}]},
-        {"a": 3.0, "b": {"c": 2.0}, "d": [{"e": 5.0}]},
+        {"a": 1.0, "b": {"c": 2.0}, "d": [{"e": 1.0}], "f": None},
+        {"a": 3.0, "b": {"c": 2.0}, "d": [{"e": 5.0}], "f": 4.0},
     ]
     found = scale_up._merged(rows, seeds=2)
+    assert scale_up.with_band(found, "f") == "4, 1 of 2 seeds"
+    three = scale_up._merged([*rows, rows[1] | {"f": 6.0}], seeds=3)
+    assert scale_up.with_band(three, "f") == "5 (-7.71 to 17.7), 2 of 3 seeds"
+    assert scale_up._merged(rows, seeds=1)["f_of"] == "1 of 2 fits"
     assert found["a"] == 2.0
     assert found["a_low"] == pytest.approx(2.0 - 12.706, rel=1e-4)
     assert found["b"] == {"c": 2.0}
