@@ -63,7 +63,7 @@ def _finish(name: str, options: argparse.Namespace) -> int:
     given = {key: asked.get(key, default) for key, default in known.items() if key != "source"}
     handed = hand_up(options.run, api_filtrate=options.api_filtrate)
     found = model(handed, **given)
-    keep(options.run, name, found, given, handed)
+    keep(options.run, name, {"given": given, **found}, handed)
     if options.json:
         print(json.dumps(found, indent=2))
         return 0

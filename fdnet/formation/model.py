@@ -173,10 +173,7 @@ def march(
                 stopped = FULL if medium.cake_permeability else CLOSED
                 break
             if after.deposit.min() < 0:
-                raise FlowError(
-                    f"a deposit of {after.deposit.min():.2g} of the volume, expected 0 or more: "
-                    f"it grows too fast for steps of fineness {fineness:g}; give a smaller one"
-                )
+                raise FlowError(f"a deposit fell below 0: give a fineness below {fineness:g}")
             left = end - time - seconds
             time = end if left < TINY * drive.seconds else time + seconds
             filtrate, since, state, parts = filtrate + way * step, since + step, after, met

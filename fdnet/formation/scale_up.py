@@ -247,11 +247,8 @@ def _without_filtration(
 
 
 # ---- A core and a well.
-Source = str | Path | FinishedRun | list[HandedUp]
-
-
 def core_flood(
-    source: Source,
+    source: str | Path | FinishedRun | list[HandedUp],
     *,
     length: float,
     diameter: float = 0.038,
@@ -264,10 +261,10 @@ def core_flood(
 ) -> dict[str, Any]:
     """A core of the specimen's sand flooded with its mud; then the flow is turned back.
 
-    It gives numbers in SI by name, with the ends of their 95 % bands as `_low` and `_high`, and
-    where some seeds or fits have none, how many have one as `_of`. It gives rows by place, what
-    was `handed_up`, `warnings`, and the answer in `words`. Raises CaseError where an argument is
-    not above 0, or the specimen cannot tell.
+    It gives numbers in SI by name, with the ends of their 95 % bands as `_low` and `_high` (`_of`:
+    how many seeds or fits have one, where not all have), rows by place, what was `handed_up`,
+    `warnings`, and the answer in `words`. Raises CaseError where an argument is not above 0, or
+    the specimen cannot tell.
 
     Args:
         source: a run, its folder, the folder of an ensemble, or what `hand_up` gave of it.
@@ -326,7 +323,7 @@ def core_flood(
 
 
 def well_invasion(
-    source: Source,
+    source: str | Path | FinishedRun | list[HandedUp],
     *,
     hours: float = 12.0,
     pressure: float | None = None,
@@ -358,10 +355,8 @@ def well_invasion(
             usual, outer = case.well.radius_m, case.well.drainage_radius_m
         well, over = radius or usual, pressure or case.fluid.overbalance_Pa
         if well + SHOT_LENGTH >= outer:
-            raise CaseError(
-                f"radius: {well:g} m, expected more than {SHOT_LENGTH:g} m, the length of a "
-                f"perforation, below the drainage radius, {outer:g} m"
-            )
+            most = f"{outer - SHOT_LENGTH:g} m, the drainage radius less a perforation"
+            raise CaseError(f"radius: {well:g} m, expected below {most}")
         if not over:
             raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
         deep, answers = 20 / min(medium.rate[medium.rate > 0], default=20.0), []
@@ -434,7 +429,7 @@ def _common(medium: Medium, column: Column, made: March) -> dict[str, Any]:
 
 # ---- Bands, words and files.
 def _banded(
-    source: Source, by_model: Callable[[Medium, Any], dict[str, Any]], api_filtrate: float | None
+    source: Any, by_model: Callable[[Medium, Any], dict[str, Any]], api_filtrate: float | None
 ) -> dict[str, Any]:
     """What the model gives for all that is handed up, with bands: of seeds, or of the fits."""
     many = source if isinstance(source, list) else hand_up(source, api_filtrate=api_filtrate)
@@ -491,18 +486,12 @@ def _above_zero(**given: float | None) -> None:
             raise CaseError(f"{name}: {value:g}, expected a number above 0")
 
 
-def keep(
-    folder: Path,
-    name: str,
-    found: Mapping[str, Any],
-    given: Mapping[str, Any],
-    handed: Sequence[HandedUp],
-) -> None:
+def keep(folder: Path, name: str, found: Mapping[str, Any], handed: Sequence[HandedUp]) -> None:
     """Keep the numbers and the fit in `formation` below the folder, and in its report."""
     out, report = folder / FORMATION, folder / "report.html"
     with locked(folder):
         out.mkdir(exist_ok=True)
-        write_text(out / f"{name}.json", plain_json({"given": given, **found})[1] + "\n")
+        write_text(out / f"{name}.json", plain_json(found)[1] + "\n")
         _draw_fit(handed, out / "handed_up.svg")
         if report.is_file():
             put_section(report, FORMATION, formation_html(out))

@@ -147,8 +147,7 @@ def class_model(
 def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
     """Let the mud in, write what is left of it into `folder`, and return the stage's record.
 
-    Raises FlowError where the steps of the model do not reach the end, CaseError where every class
-    is rounded to no fine.
+    Raises FlowError where its steps do not reach the end, CaseError where all is rounded to none.
     """
     seen: dict[int, dict[str, Array]] = {}
     see, course = partial(watch, seen), model.course
@@ -161,11 +160,10 @@ def write_class_invasion(model: ClassModel, folder: Path) -> dict[str, Any]:
         )
     counts = model.counted(end.by_class)
     if not counts.rows[-1].any():
-        come = float((end.solids.supplied / model.classes.volume).sum())
         raise CaseError(
-            f"size classes: the mud brought {come:.2g} fines in {len(model.classes.volume)} "
-            "classes, expected half a fine or more of one class in the sand, before it or beyond; "
-            "raise fines.count or what ends the run, or lower invasion.classes"
+            f"size classes: {np.sum(end.solids.supplied / model.classes.volume):.2g} fines came, "
+            "expected enough for half a fine of one class in the sand or before it; raise "
+            "fines.count or what ends the run, or lower invasion.classes"
         )
     arrays = {one.name: getattr(end.solids, one.name) for one in fields(end.solids)}
     arrays |= {f"row_{key}": np.array([row[key] for row in end.rows]) for key in end.rows[0]}

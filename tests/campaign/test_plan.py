@@ -50,7 +50,6 @@ def planned(path: Path) -> tuple[dict, dict]:
 
 
 def test_a_dry_run_says_the_time_and_writes_nothing(write, tmp_path, capsys, monkeypatch):
-    """It refuses what the run would: a resource without a value, and a missing Snakemake."""
     path = write(GRID)
     words = ["sweep", str(path), "--out", str(tmp_path / "out"), "--dry-run", "--jobs", "3"]
     for find, resource, code in ((str, "x", 2), ({}.get, "mem=1", 2), (str, "runtime=60", 0)):
@@ -124,8 +123,8 @@ def test_bad_sweeps_are_refused_with_the_key(write, capsys):
 def test_a_million_runs_are_refused_with_their_number(write, capsys):
     values = list(range(1, 1001))
     path = write(f'case = "tiny.toml"\nseeds = 1000\n[grid]\nfines.count = {values}')
-    assert main(["sweep", str(path), "--out", str(path.parent / "out")]) == 2
-    error = capsys.readouterr().err
+    code, _, error = answer(capsys, "sweep", path, "--out", path.parent / "out")
+    assert code == 2
     assert "1,000,000 runs, more than 1,000" in error
     assert "--jobs-limit 1000000" in error
 
