@@ -24,7 +24,7 @@ from fdnet.dem.deck import number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
 from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.files import write_text
-from fdnet.scales.clock import ARRIVALS, PRESSED, arrival_time, rises
+from fdnet.scales.clock import ARRIVALS, PRESSED, REST, arrival_time, rises
 from fdnet.scales.contacts import two_digits_up
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import read_frame
@@ -292,10 +292,6 @@ def empty_chunks(case: InvasionCase, scales: InvasionScales) -> int:
     """
     passage, chunk = 2 * case.size_m[0] / scales.drive_velocity, scales.checkpoint_steps
     return max(quiet_chunks(scales), math.ceil(passage / (chunk * scales.time_step)))
-
-
-REST = 0.01
-"""Mean velocity of the fines inside over the fluid's first one at which they rest in any case."""
 
 
 def quiet_enough(
