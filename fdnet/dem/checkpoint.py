@@ -374,9 +374,10 @@ def steps_after(
     watches the next of the `groups` of grains.
     """
     others = [chunk for chunk, one in enumerate(steps) if one != steps[-1]]
-    first = others[-1] + 1 if others else 0
-    asked = first > 0 and len(steps) <= first + groups
-    known = lasted[first - asked : min(first + groups, len(steps) - 1)]
+    first = others[-1] + 1 if others else 0  # with the present springs
+    whole = first + groups  # chunks until all grains were watched with them
+    begin = first - 1 if 0 < first and len(steps) <= whole else first
+    known = lasted[begin : min(whole, len(steps) - 1)]
     least = max(GROWN * max(known, default=0.0), RAISE_ABOVE * PRESSED)
     if not rises(case) or lasted[-1] <= least:
         return steps[-1]
