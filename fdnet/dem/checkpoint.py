@@ -376,7 +376,7 @@ def steps_after(
     others = [chunk for chunk, one in enumerate(steps) if one != steps[-1]]
     first = others[-1] + 1 if others else 0  # with the present springs
     whole = first + groups  # chunks until all grains were watched with them
-    begin = first - 1 if 0 < first and len(steps) <= whole else first
+    begin = first - 1 if first > 0 and len(steps) <= whole else first
     known = lasted[begin : min(whole, len(steps) - 1)]
     least = max(GROWN * max(known, default=0.0), RAISE_ABOVE * PRESSED)
     if not rises(case) or lasted[-1] <= least:
