@@ -583,8 +583,8 @@ def class_summary(case: InvasionCase, model: ClassModel, kept: ClassInvasion) ->
 
 
 METHOD_ERROR = (
-    "on the packs of five cases its first millimetre kept 1.05 to 1.7 times the permeability that "
-    "LIGGGHTS's spheres left, and its 95 % depth was 0.69 to 1.1 times theirs "
+    "on the packs of five cases its first millimetre kept 1.04 to 1.7 times the permeability that "
+    "LIGGGHTS's spheres left, and its 95 % depth was 0.71 to 1.2 times theirs "
     "(docs/theory/size_classes.md)"
 )
 """By docs/validation/size_classes.csv: the least and the largest mean of a case."""
