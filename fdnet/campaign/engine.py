@@ -63,11 +63,13 @@ class HowToRun:
         return [str(word) for name, value in given.items() if value for word in (name, value)]
 
     def refuse(self) -> None:
-        """Raise CaseError where Snakemake is asked for and not installed."""
+        """Raise CaseError where Snakemake is asked for and missing, or a resource has no value."""
         plugin = "snakemake_executor_plugin_slurm" if self.engine == "slurm" else "snakemake"
         if self.engine != "local" and not (has_snakemake() and find_spec(plugin)):
             advice = "pip install 'fdnet[sweep]', or take --engine local"
             raise CaseError(f"--engine {self.engine}: {plugin} is not installed; {advice}")
+        for resource in self.resources:
+            _quoted(resource)
 
     def say(self, text: str) -> None:
         """Show how far it is."""

@@ -182,7 +182,7 @@ class Material(Part):
 
 SHEAR_RATIO = 0.04
 """Tangential over normal stiffness of a material that gives none: small enough that no fine larger
-than 1/370 of a grain at friction 0.55 locks between two grains (`fdnet.scales.contacts`)."""
+than 1/378 of a grain at friction 0.55 locks between two grains (`fdnet.scales.contacts`)."""
 
 
 class Spheres(Part):

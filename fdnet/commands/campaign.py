@@ -92,6 +92,7 @@ def _run_campaign(options: argparse.Namespace, plan: "Plan") -> int:
 
     how, limits = _how_of(options), read_targets(plan.targets)
     if options.dry_run:
+        how.refuse()
         by = "fdnet itself" if how.engine == "local" else "Snakemake"
         by = f"Slurm with {', '.join(how.resources)}" if how.engine == "slurm" else by
         way = f"would run in {options.out}: {how.jobs} at a time, by {by}"

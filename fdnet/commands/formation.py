@@ -55,19 +55,20 @@ def _finish(name: str, options: argparse.Namespace) -> int:
     """Compute, keep the numbers and the figure in the folder, print them."""
     import pandas as pd
 
-    from fdnet.formation.scale_up import core_flood, keep, well_invasion, with_band
+    from fdnet.formation.scale_up import core_flood, hand_up, keep, well_invasion, with_band
 
     model: Any = core_flood if name == "core" else well_invasion
     asked = {key: value for key, value in vars(options).items() if value is not None}
     known = {key: one.default for key, one in signature(model).parameters.items()}
     given = {key: asked.get(key, default) for key, default in known.items() if key != "source"}
-    found = model(options.run, **given)
-    keep(options.run, name, found, given)
+    handed = hand_up(options.run, api_filtrate=options.api_filtrate)
+    found = model(handed, **given)
+    keep(options.run, name, {"given": given, **found}, handed)
     if options.json:
         print(json.dumps(found, indent=2))
         return 0
     table = found["sections" if name == "core" else "k_over_k0"]
-    keys = [key for key in table[0] if not key.endswith(("_low", "_high"))]
+    keys = [key for key in table[0] if not key.endswith(("_low", "_high", "_of"))]
     rows = [{key: with_band(row, key) for key in keys} for row in table]
     print(*found["words"], "", pd.DataFrame(rows).to_string(index=False), sep="\n")
     for warning in () if options.quiet else found["warnings"]:

@@ -24,7 +24,7 @@ from fdnet.dem.deck import number, render_text, snapshot_of
 from fdnet.dem.supply import Batches, batches_of
 from fdnet.errors import CaseError, DumpError, LiggghtsError
 from fdnet.files import write_text
-from fdnet.scales.clock import ARRIVALS, PRESSED, arrival_time, rises
+from fdnet.scales.clock import ARRIVALS, PRESSED, REST, arrival_time, rises
 from fdnet.scales.contacts import two_digits_up
 from fdnet.scales.scales import InvasionScales
 from fdnet.spheres.dump import read_frame
@@ -294,10 +294,6 @@ def empty_chunks(case: InvasionCase, scales: InvasionScales) -> int:
     return max(quiet_chunks(scales), math.ceil(passage / (chunk * scales.time_step)))
 
 
-REST = 0.01
-"""Mean velocity of the fines inside over the fluid's first one at which they rest in any case."""
-
-
 def quiet_enough(
     folder: Path, case: InvasionCase, scales: InvasionScales, row: Checkpoint
 ) -> bool:
@@ -356,11 +352,12 @@ def time_of(row: Checkpoint, scales: InvasionScales) -> float:
 # deposit: steps of a chunk go with the root of the stiffness, so history.csv records it.
 
 
-RAISE_ABOVE, RAISE_TO, MOST_RAISE = 0.67, 0.6, 2.0
-"""Shares of `PRESSED`: springs are stiffened at a checkpoint when the overlap that lasted in the
-chunk before was above the first and more than before, so that it would have been the second. At
-most so many times the steps at once. A fine that is wedged between grains keeps its overlap with
-stiffer springs too."""
+RAISE_ABOVE, RAISE_TO, GROWN, MOST_RAISE = 0.67, 0.6, 1.1, 2.0
+"""Springs are stiffened at a checkpoint when the overlap that lasted in the chunk before was above
+the first share of `PRESSED`, so that it would have been the second. At most so many times the
+steps at once. A fine that is wedged between grains keeps its overlap with stiffer springs too: so
+the overlap must be `GROWN` times the largest of the first chunks with the present springs, in
+which each group of grains was watched. Until then what they were stiffened for counts as well."""
 
 
 def lasting_overlap(seen: Sequence[float]) -> float:
@@ -368,16 +365,24 @@ def lasting_overlap(seen: Sequence[float]) -> float:
     return sorted(seen)[math.ceil(9 * (len(seen) - 1) / 10)]
 
 
-def steps_after(case: InvasionCase, steps: int, overlap: float, before: float = 0.0) -> int:
-    """Steps of the chunk after one of `steps` steps with an `overlap` that lasted.
+def steps_after(
+    case: InvasionCase, steps: Sequence[int], lasted: Sequence[float], groups: int
+) -> int:
+    """Steps of the chunk after some of so many `steps`, in each of which an overlap `lasted`.
 
-    In the chunk `before` it was another. It goes with the stiffness k to the power -1 (Hertz
-    -2/3), the step with k to -1/2.
+    It goes with the stiffness k to the power -1 (Hertz -2/3), the step with k to -1/2. Each chunk
+    watches the next of the `groups` of grains.
     """
-    if not rises(case) or overlap <= max(before, RAISE_ABOVE * PRESSED):
-        return steps
+    others = [chunk for chunk, one in enumerate(steps) if one != steps[-1]]
+    first = others[-1] + 1 if others else 0  # with the present springs
+    whole = first + groups  # chunks until all grains were watched with them
+    begin = first - 1 if first > 0 and len(steps) <= whole else first
+    known = lasted[begin : min(whole, len(steps) - 1)]
+    least = max(GROWN * max(known, default=0.0), RAISE_ABOVE * PRESSED)
+    if not rises(case) or lasted[-1] <= least:
+        return steps[-1]
     power = 0.75 if case.contact.model == "hertz" else 0.5
-    return math.ceil(steps * min(MOST_RAISE, (overlap / (RAISE_TO * PRESSED)) ** power))
+    return math.ceil(steps[-1] * min(MOST_RAISE, (lasted[-1] / (RAISE_TO * PRESSED)) ** power))
 
 
 # ---- The states of checkpoints, from their dumps.

@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from fdnet.files import disk_is_full, write_text
 from fdnet.scales.clock import ARRIVALS, rises
 from fdnet.scales.scales import InvasionScales, stiffened
 from fdnet.spheres.dump import Frame
+from fdnet.spheres.geometry import groups_apart
 from fdnet.spheres.snapshot import Snapshot
 
 _START_OF_SCREEN = 1 << 20
@@ -254,6 +256,17 @@ class InvadeStage(ChunkedStage):
         """The files that its deck reads."""
         return InvadeInputs(self.case, self.scales, self.grains, self.folder)
 
+    @cached_property
+    def _overlaps(self) -> dict[int, float]:
+        """By the step of a checkpoint the overlap that lasted in its chunk."""
+        return {}
+
+    @cached_property
+    def _turns(self) -> int:
+        """In so many chunks fines are watched with all grains once; dumps show all at once."""
+        watched = checkpoint.is_watched(self.case)
+        return int(groups_apart(self.grains, self.case.periodic).max()) if watched else 1
+
     def write(self, last: Checkpoint | None) -> Deck:
         """Write the inputs of a start, or of a restart from `last`."""
         ranks = self.launch.ranks
@@ -279,32 +292,34 @@ class InvadeStage(ChunkedStage):
     def pace(self, last: Checkpoint | None) -> InvasionScales:
         """The scales of the chunk after `last`, with springs that bear what the chunk before saw.
 
-        They follow from what its checkpoint records: its steps, and the watched overlaps, or its
-        dump where none are watched.
+        They follow from what the checkpoints up to it record: the steps, and the watched overlaps,
+        or the dumps where none are watched.
         """
         case, scales = self.case, self.scales
         if last is None or not rises(case):
             return scales
-        earlier = [one for one in checkpoint.read_rows(self.folder) if one.chunk < last.chunk]
-        begun = [0, 0, *(one.step for one in earlier)][-2:]
-        watched = checkpoint.read_watch(self.folder)
+        rows = [row for row in checkpoint.read_rows(self.folder) if row.chunk <= last.chunk]
+        ends = [0, *(row.step for row in rows)]
+        lasted = [self._lasted(since, row) for since, row in zip(ends, rows, strict=False)]
+        steps = [end - begin for begin, end in pairwise(ends)]
+        return stiffened(case, scales, checkpoint.steps_after(case, steps, lasted, self._turns))
 
-        def lasting(first: int, row: Checkpoint) -> float:
-            seen = [one.fraction for one in watched if first < one.step <= row.step]
+    def _lasted(self, since: int, row: Checkpoint) -> float:
+        """The overlap that lasted from the step `since` to a checkpoint."""
+        if row.step not in self._overlaps:
+            watched = checkpoint.read_watch(self.folder)
+            seen = [one.fraction for one in watched if since < one.step <= row.step]
+            if not seen and not self.points.holds(row.step, "dump"):
+                raise LiggghtsError(
+                    f"{self.points.path(row.step, 'dump')}: is missing, or not as it was "
+                    "recorded, and the springs of the next chunk follow from it; put it back, "
+                    "or start over with --force"
+                )
             if not seen:
-                if row is not last and not self.points.holds(row.step, "dump"):
-                    raise LiggghtsError(
-                        f"{self.points.path(row.step, 'dump')}: is missing, or not as it was "
-                        "recorded, and the springs of the next chunk follow from it; put it back, "
-                        "or start over with --force"
-                    )
-                state = checkpoint.state_at(self.folder, row, case, scales, self.grains)
-                seen.append(checkpoint.overlap_in(case, state).fraction)
-            return checkpoint.lasting_overlap(seen)
-
-        before = lasting(begun[0], earlier[-1]) if earlier else 0.0
-        seen, steps = lasting(begun[1], last), last.step - begun[1]
-        return stiffened(case, scales, checkpoint.steps_after(case, steps, seen, before))
+                state = checkpoint.state_at(self.folder, row, self.case, self.scales, self.grains)
+                seen.append(checkpoint.overlap_in(self.case, state).fraction)
+            self._overlaps[row.step] = checkpoint.lasting_overlap(seen)
+        return self._overlaps[row.step]
 
     def begin_chunk(self, feed: Feed, updates: Updates, last: Checkpoint | None) -> None:
         """Feed the batches that are due, and the grains that are watched next."""

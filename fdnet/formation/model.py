@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import solve_banded
 from scipy.special import exprel
 
+from fdnet.errors import FlowError
 from fdnet.spheres.snapshot import Array
 
 FINENESS, TINY = 0.05, 1e-12  # Largest relative step, and what is as good as nothing
@@ -139,7 +140,7 @@ def march(
 
     A back-flow lifts the cake first. `taps` (S+1,) m are the depths between which sections are
     measured, by default the ends. `fineness` is the largest step over the volume of the drive; the
-    error falls with it to first order.
+    error falls with it to first order. Raises FlowError where a deposit would fall below 0.
     """
     cells, mu = np.zeros((len(medium.rate), len(column.edges) - 1)), medium.viscosity
     state, ends = Filled(cells, cells, cells, 0.0, 0.0), column.edges[[0, -1]]
@@ -171,6 +172,8 @@ def march(
             if np.isinf(met[0]):
                 stopped = FULL if medium.cake_permeability else CLOSED
                 break
+            if after.deposit.min() < 0:
+                raise FlowError(f"a deposit fell below 0: give a fineness below {fineness:g}")
             left = end - time - seconds
             time = end if left < TINY * drive.seconds else time + seconds
             filtrate, since, state, parts = filtrate + way * step, since + step, after, met

@@ -88,6 +88,7 @@ class HandedUp(NamedTuple):
     x: Array  # (F,) m, even depths of the specimen
     fitted: Array  # (F,) deposit there, by the fit
     notes: tuple[str, ...]  # what could not be told, and what was assumed
+    api_filtrate: float | None  # m3, that the cake is known by
 
 
 def hand_up(
@@ -167,7 +168,7 @@ def _of_run(run: FinishedRun, api_filtrate: float | None, draws: int) -> list[Ha
     x = (np.arange(PLACES) + 0.5) * (length / PLACES)
     if found < FEWEST:
         notes.append(f"only {found} fines entered before the face closed: all is cake")
-        return [HandedUp(run, medium, x, 0.0 * x, tuple(notes))]
+        return [HandedUp(run, medium, x, 0.0 * x, tuple(notes), api_filtrate)]
     if few := [one.name for one in kinds if one.number < FEWEST]:
         notes.append(
             f"too little of the fines of {', '.join(few)} rests inside for more than one number: "
@@ -194,7 +195,7 @@ def _of_run(run: FinishedRun, api_filtrate: float | None, draws: int) -> list[Ha
         harm, error = fit_damage(kept[paths], fitted, share)
         damage = math.exp(harm + (error * sample.standard_normal() if sample else 0.0))
         own = replace(medium, damage=damage, rate=rate, growth=np.expm1(g) / face, closing=face)
-        many.append(HandedUp(run, own, x, fitted, tuple(notes)))
+        many.append(HandedUp(run, own, x, fitted, tuple(notes), api_filtrate))
     return many
 
 
@@ -247,7 +248,7 @@ def _without_filtration(
 
 # ---- A core and a well.
 def core_flood(
-    source: str | Path | FinishedRun,
+    source: str | Path | FinishedRun | list[HandedUp],
     *,
     length: float,
     diameter: float = 0.038,
@@ -260,12 +261,13 @@ def core_flood(
 ) -> dict[str, Any]:
     """A core of the specimen's sand flooded with its mud; then the flow is turned back.
 
-    It gives numbers in SI by name, with the ends of their 95 % bands as `_low` and `_high`, rows
-    by place, what was `handed_up`, `warnings`, and the answer in `words`. Raises CaseError where
-    an argument is not above 0, or the specimen cannot tell.
+    It gives numbers in SI by name, with the ends of their 95 % bands as `_low` and `_high` (`_of`:
+    how many seeds or fits have one, where not all have), rows by place, what was `handed_up`,
+    `warnings`, and the answer in `words`. Raises CaseError where an argument is not above 0, or
+    the specimen cannot tell.
 
     Args:
-        source: a run, its folder, or the folder of an ensemble.
+        source: a run, its folder, the folder of an ensemble, or what `hand_up` gave of it.
         length, diameter: m.
         rate, pressure: m3/s, or Pa over the core and its cake; one of them.
         minutes: of the flood.
@@ -321,7 +323,7 @@ def core_flood(
 
 
 def well_invasion(
-    source: str | Path | FinishedRun,
+    source: str | Path | FinishedRun | list[HandedUp],
     *,
     hours: float = 12.0,
     pressure: float | None = None,
@@ -352,8 +354,9 @@ def well_invasion(
         if case.well is not None:
             usual, outer = case.well.radius_m, case.well.drainage_radius_m
         well, over = radius or usual, pressure or case.fluid.overbalance_Pa
-        if well >= outer:
-            raise CaseError(f"radius: {well:g} m, expected below the drainage radius, {outer:g} m")
+        if well + SHOT_LENGTH >= outer:
+            most = f"{outer - SHOT_LENGTH:g} m, the drainage radius less a perforation"
+            raise CaseError(f"radius: {well:g} m, expected below {most}")
         if not over:
             raise CaseError("the case has no fluid.overbalance_MPa; give --pressure")
         deep, answers = 20 / min(medium.rate[medium.rate > 0], default=20.0), []
@@ -426,12 +429,12 @@ def _common(medium: Medium, column: Column, made: March) -> dict[str, Any]:
 
 # ---- Bands, words and files.
 def _banded(
-    source: str | Path | FinishedRun,
-    by_model: Callable[[Medium, Any], dict[str, Any]],
-    api_filtrate: float | None,
+    source: Any, by_model: Callable[[Medium, Any], dict[str, Any]], api_filtrate: float | None
 ) -> dict[str, Any]:
     """What the model gives for all that is handed up, with bands: of seeds, or of the fits."""
-    many = hand_up(source, api_filtrate=api_filtrate)
+    many = source if isinstance(source, list) else hand_up(source, api_filtrate=api_filtrate)
+    if (by := many[0].api_filtrate) != api_filtrate:
+        raise CaseError(f"api_filtrate: {api_filtrate}, expected {by} as it was handed up with")
     seeds = len({one.run.path for one in many})
     each = [by_model(one.medium, one.run.case) for one in many]
     notes = [note for one in many for note in one.notes]
@@ -445,30 +448,36 @@ def _banded(
 def _merged(trees: Sequence[Any], seeds: int) -> Any:
     """The first of the trees, a number that differs between them with its band.
 
-    The first is that of a single run, and the mean takes its place where there are several.
+    The first is that of a single run, and the mean takes its place where there are several. Where
+    some have no such number, `_of` says how many have one.
     """
     if isinstance(trees[0], list):
         return [_merged(row, seeds) for row in zip(*trees, strict=False)]
     result: dict[str, Any] = {}
-    for key, value in trees[0].items():
-        values = [tree[key] for tree in trees if key in tree]
-        result[key] = _merged(values, seeds) if isinstance(value, dict | list) else value
-        if isinstance(value, float) and None not in values:
-            band, (low, high) = student_band(values), np.percentile(values, (2.5, 97.5)).tolist()
+    for key in dict.fromkeys(key for tree in trees for key in tree):
+        known = [tree[key] for tree in trees if tree.get(key) is not None]
+        value = known[0] if known and seeds > 1 else trees[0].get(key)
+        result[key] = _merged(known, seeds) if isinstance(value, dict | list) else value
+        if isinstance(value, float) and not np.allclose(known, value, 1e-9, 0):
+            low, high = np.percentile(known, (2.5, 97.5)).tolist()
             if seeds > 1:
+                band = student_band(known)
                 value, low, high = band.mean, band.low, band.high
-            if not np.allclose(values, value, 1e-9, 0):
-                result |= {key: value, f"{key}_low": low, f"{key}_high": high}
+            result |= {key: value, f"{key}_low": low, f"{key}_high": high}
+        if 0 < len(known) < len(trees):
+            whose = "seeds" if seeds > 1 else "fits"
+            result[f"{key}_of"] = f"{len(known)} of {len(trees)} {whose}"
     return result
 
 
 def with_band(row: Mapping[str, Any], key: str) -> str:
-    """The number of a row with its band; a share in percent."""
+    """The number of a row with its band, and of whom it is; a share in percent."""
     share = key.endswith(("_over_k0", "_lost"))
     values = [row[key], row.get(f"{key}_low"), row.get(f"{key}_high")]
     one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.3g}" for v in values)
-    unit = " %" if share else ""
-    return f"{one}{unit}" if None in band else f"{one}{unit} ({band[0]} to {band[1]}{unit})"
+    unit, of = " %" if share else "", f", {row[f'{key}_of']}" if f"{key}_of" in row else ""
+    ends = "" if None in band else f" ({band[0]} to {band[1]}{unit})"
+    return f"{one}{unit}{ends}{of}"
 
 
 def _above_zero(**given: float | None) -> None:
@@ -477,13 +486,13 @@ def _above_zero(**given: float | None) -> None:
             raise CaseError(f"{name}: {value:g}, expected a number above 0")
 
 
-def keep(folder: Path, name: str, found: Mapping[str, Any], given: Mapping[str, Any]) -> None:
+def keep(folder: Path, name: str, found: Mapping[str, Any], handed: Sequence[HandedUp]) -> None:
     """Keep the numbers and the fit in `formation` below the folder, and in its report."""
     out, report = folder / FORMATION, folder / "report.html"
     with locked(folder):
         out.mkdir(exist_ok=True)
-        write_text(out / f"{name}.json", plain_json({"given": given, **found})[1] + "\n")
-        _draw_fit(hand_up(folder), out / "handed_up.svg")
+        write_text(out / f"{name}.json", plain_json(found)[1] + "\n")
+        _draw_fit(handed, out / "handed_up.svg")
         if report.is_file():
             put_section(report, FORMATION, formation_html(out))
 

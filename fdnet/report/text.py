@@ -23,6 +23,7 @@ from fdnet.report.tables import (
     percent,
     two_digits,
 )
+from fdnet.scales.clock import REST
 from fdnet.scales.pack import SHARES
 from fdnet.scales.scales import InvasionScales
 
@@ -107,17 +108,18 @@ def end_words(summary: Mapping[str, Any], control: Run) -> str:
         return f"the invasion was cut at {done} % of the steps that it is expected to take"
     if reason != "plugged":
         return ENDS[reason]
-    least = control.stop_rate
-    if summary.get("method") == "both":
-        least = least or control.plug_rate
+    method = summary.get("method")
+    least = control.stop_rate or (control.plug_rate if method == "both" else None)
     if least is not None and rate is not None and rate <= least:
         return f"the rate of flow fell below {percent(least)} % of the first"
     most = "no fine"
     if control.plug_rate:
         most = f"at most {percent(control.plug_rate)} % of the fines of the undisturbed mud"
-    if rate is None:
+    if rate is None or method == "network":
         return f"the face plugged: {most} crossed it for the set time"
-    return f"the face plugged: {most} entered or left for the set time, and those inside rest"
+    rest = f"{percent(max(REST, control.plug_rate))} % of the fluid's first velocity"
+    moving = f"those inside moved at no more than {rest} on average"
+    return f"the face plugged: {most} entered or left for the set time, and {moving}"
 
 
 def in_place_words(counts: Mapping[str, int]) -> str:

@@ -235,7 +235,7 @@ def with_added(results: Results, record: dict[str, Any] | None) -> Results:
         added = [*_filtrate(one)]
     elif one is not None:
         added = [_cake(results, one), *_filtrate(one)]
-    if one is not None and results.analysis.invaded_count:
+    if one is not None and results.analysis.invaded_count and len(one.damaged.fines()):
         added.append(_bridging(results, one))
     if results.cleaned is not None and record is not None:
         added.append(_clean_up(results, results.cleaned, record))

@@ -131,6 +131,8 @@ def slab_warnings(case: InvasionCase, slab: Slab) -> list[Doubt]:
 # ---- When an invasion ends, and how often it is looked at until then.
 ARRIVALS = 10
 """The default plug time lets at least this many fines of the undisturbed suspension arrive."""
+REST = 0.01
+"""Mean velocity of the fines inside over the fluid's first one at which they rest in any case."""
 
 
 class StopTimes(NamedTuple):

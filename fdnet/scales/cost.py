@@ -36,8 +36,8 @@ START_SECONDS, REPORT_SECONDS, SPHERE_SECONDS = 3.0, 8.0, 6.0e-4
 REPORT_BYTES, NETWORK_BYTES = 6.0e8, 8.0e3
 """Memory of the report, and of the network for each of up to `MOST_SPHERES` spheres."""
 
-CLASS_SECONDS = 7e-3
-"""s for each grain of the fast model, whose steps solve the flow some hundred times."""
+CLASS_SECONDS = 1.3e-3
+"""s for each grain of the fast model, in 26 to 43 steps (docs/validation/class_costs.csv)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -198,10 +198,8 @@ def test_resources_reach_sbatch_as_they_are_and_its_reason_the_user(tmp_path, ca
 
 def test_resources_that_are_no_words_are_refused(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(engine_module, "find_spec", lambda name: True)
-    fake = fake_liggghts(tmp_path / "lmp", "exit 1")
     for bad in ("a\nb=1", "slurm_partition", "=3", "a b=1", "x=", "__import__('os')=1"):
-        arguments = words(tmp_path, "auto", "--liggghts", fake, "--slurm", bad)
-        assert main(arguments) == 2, bad
+        assert main(words(tmp_path, "auto", "--slurm", bad)) == 2, bad
         assert "--slurm: " in capsys.readouterr().err
     assert main(words(tmp_path, "local", "--slurm", "runtime=1")) == 2
     assert main(words(tmp_path, "local", "--jobs", "0")) == 2

@@ -11,6 +11,7 @@ from campaign.samples import finished_run
 
 import fdnet
 from fdnet import CaseError, read_case
+from fdnet.campaign import engine
 from fdnet.campaign.plan import sweep_plan
 from fdnet.cli import main
 from fdnet.run.pipeline import refusals
@@ -48,10 +49,12 @@ def planned(path: Path) -> tuple[dict, dict]:
     return plan, {name: read_case(out / f"cases/{name}.toml") for name in names}
 
 
-def test_a_dry_run_says_the_time_and_writes_nothing(write, tmp_path, capsys):
+def test_a_dry_run_says_the_time_and_writes_nothing(write, tmp_path, capsys, monkeypatch):
     path = write(GRID)
-    words = ["sweep", str(path), "--out", str(tmp_path / "out"), "--dry-run"]
-    assert main([*words, "--jobs", "3", "--slurm", "runtime=60"]) == 0
+    words = ["sweep", str(path), "--out", str(tmp_path / "out"), "--dry-run", "--jobs", "3"]
+    for find, resource, code in ((str, "x", 2), ({}.get, "mem=1", 2), (str, "runtime=60", 0)):
+        monkeypatch.setattr(engine, "find_spec", find)
+        assert main([*words, "--slurm", resource]) == code
     said = capsys.readouterr().out.splitlines()
     assert len(said) == 8
     assert said[-2].startswith("12 runs: ")
@@ -120,8 +123,8 @@ def test_bad_sweeps_are_refused_with_the_key(write, capsys):
 def test_a_million_runs_are_refused_with_their_number(write, capsys):
     values = list(range(1, 1001))
     path = write(f'case = "tiny.toml"\nseeds = 1000\n[grid]\nfines.count = {values}')
-    assert main(["sweep", str(path), "--out", str(path.parent / "out")]) == 2
-    error = capsys.readouterr().err
+    code, _, error = answer(capsys, "sweep", path, "--out", path.parent / "out")
+    assert code == 2
     assert "1,000,000 runs, more than 1,000" in error
     assert "--jobs-limit 1000000" in error
 

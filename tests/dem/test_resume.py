@@ -244,7 +244,7 @@ def test_springs_grow_with_the_load_and_go_on_bit_for_bit(go, rising, tmp_path):
 
 @pytest.mark.parametrize("spoil", [noise, Path.unlink])
 def test_springs_do_not_follow_from_a_dump_that_is_spoilt(go, rising, tmp_path, spoil):
-    """Without watched overlaps the springs of a chunk follow from the dumps of the two before."""
+    """Without watched overlaps the springs of a chunk follow from the dumps of all before."""
     folder, history = shutil.copytree(rising[0], tmp_path / "cut"), rising[1].history
     kept = points(folder, RISING)
     (folder / "overlap.csv").unlink()
@@ -252,7 +252,7 @@ def test_springs_do_not_follow_from_a_dump_that_is_spoilt(go, rising, tmp_path, 
         kept.path(history[-1].step, suffix).unlink()
     for row in history[:-1]:
         kept.store(row.step, kept.record(row.step)._replace(overlap=rows_digest([])))
-    spoil(kept.path(history[-3].step, "dump"))
+    spoil(kept.path(history[0].step, "dump"))
     with pytest.raises(LiggghtsError, match="the springs of the next chunk follow from it"):
         go(RISING, folder)
 

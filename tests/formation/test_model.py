@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fdnet.errors import FlowError
 from fdnet.formation.model import CAKE_SKINS, FULL, STRAIGHT, Column, Flood, Medium, march
 from fdnet.run.answer import hawkins
 
@@ -70,9 +71,11 @@ def test_the_langmuir_solution_is_met_with_first_order():
 
 def test_filtration_is_that_of_the_deposit_half_way():
     """At the usual step the deposit errs by 0.2 % of its most; by that of the start by 1 %."""
-    full = mud((0.01, 30.0, -50.0))
+    full, fuller = (mud((0.01, 30.0, growth)) for growth in (-50.0, -2000.0))
     fine, usual = (flood(CORE, 8.0, fineness=f, **full).end.deposit for f in (0.005, 0.05))
     assert usual == pytest.approx(fine, abs=4e-5)
+    with pytest.raises(FlowError, match=r"below 0: give a fineness below 0\.05"):
+        flood(CORE, 8.0, **fuller)
 
 
 def test_no_fines_are_lost_or_made():

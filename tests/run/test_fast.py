@@ -16,17 +16,7 @@ from fdnet.cli import main
 from fdnet.errors import CaseError, FlowError
 from fdnet.report.picture import PNG_START
 from fdnet.run import by_classes, movie
-from fdnet.run.by_classes import (
-    MOST_STATES,
-    STATE,
-    all_is_cake,
-    class_model,
-    finished_classes,
-    read_classes,
-    states_on_the_way,
-    watch,
-    write_class_invasion,
-)
+from fdnet.run.by_classes import STATE, class_model, read_classes, write_class_invasion
 from fdnet.run.finished import open_run
 from fdnet.run.movie import fluxes_of, states_of
 from fdnet.run.pipeline import run_case
@@ -86,11 +76,16 @@ def test_what_the_case_says_of_the_flow_ends_a_fast_run_too(fast):
     assert end.rows[-1]["filtrate_m3"] == pytest.approx(0.01 * pores, rel=1e-9)
 
 
-def test_a_fast_run_of_too_many_steps_is_refused_and_not_cut(fast, tmp_path, monkeypatch):
-    monkeypatch.setattr(invasion, "MOST_STEPS", 3)
-    model = class_model(fast.case, invasion_scales(fast.case), fast.spheres("initial"))
-    with pytest.raises(FlowError, match=r"3 steps reached .* of at most .* ms; raise run.plug"):
-        write_class_invasion(model, tmp_path / "invade")
+def test_a_fast_run_of_too_many_steps_or_too_few_fines_is_refused(fast, tmp_path, monkeypatch):
+    few = "fines={sizes={D10_mm=0.04,D50_mm=0.07,D90_mm=0.1},count=2,concentration=0.1}"
+    for case, steps, error, said in (
+        (tiny(*FAST, few), 5000, CaseError, r"2.1 fines came, .* raise fines.count"),
+        (fast.case, 3, FlowError, r"3 steps reached .* of at most .* ms; raise run.plug"),
+    ):
+        monkeypatch.setattr(invasion, "MOST_STEPS", steps)
+        model = class_model(case, invasion_scales(case), fast.spheres("initial"))
+        with pytest.raises(error, match=said):
+            write_class_invasion(model, tmp_path / "invade")
 
 
 def test_a_killed_run_goes_on_from_the_pack_to_the_same_bits(fast, tmp_path):
@@ -109,7 +104,7 @@ def test_a_movie_shows_the_solids_that_the_history_counts(fast, tmp_path, monkey
     """In every state, and none moves; the last is the end of the run."""
     clean, *states = states_of(fast)
     assert clean.spheres is None
-    assert len(states) == min(len(fast.history) - 1, MOST_STATES)
+    assert len(states) == min(len(fast.history) - 1, by_classes.MOST_STATES)
     seen = {}
     for one in states:
         fines = read_spheres(one.spheres, box=[(0.0, side) for side in fast.case.size_m])
@@ -150,7 +145,7 @@ def test_a_fast_run_of_an_earlier_version_has_its_end_to_show_and_no_flow(fast, 
     with np.load(old / "invade" / STATE) as data:
         kept = {name: data[name] for name in data.files if not name.startswith("state_")}
     np.savez_compressed(old / "invade" / STATE, **kept)
-    done, *_ = finished_classes(
+    done, *_ = by_classes.finished_classes(
         fast.case, invasion_scales(fast.case), fast.spheres("initial"), old / "invade"
     )
     ((row, fines),) = done.states
@@ -165,14 +160,14 @@ def test_states_on_the_way_are_even_and_what_was_washed_out_is_drawn(fast):
     kept, seen = read_classes(fast.path / "invade" / STATE), {}
     flow = SimpleNamespace(throat_flux=np.array([-1.0, 3.0]), inflow=2.0)
     for step in range(150):
-        watch(seen, step, kept.solids, flow)
+        by_classes.watch(seen, step, kept.solids, flow)
     assert list(seen) == [*range(0, 150, 8), 149]
     assert seen[149]["flux"].tolist() == [0.5, 1.5]
     by_class = np.repeat(kept.by_class[-1:], 150, axis=0)
     by_class[8, 0, 0] += 5 * model.classes.volume[0]
     kept = replace(kept, by_class=by_class, rows=kept.rows[-1:] * 150)
     end, held = fast.spheres().fines(), {step: one["held"] for step, one in seen.items()}
-    states = [one for _, one in states_on_the_way(fast.case, model, kept, held)]
+    states = [one for _, one in by_classes.states_on_the_way(fast.case, model, kept, held)]
     assert [len(one) - len(end) for one in states] == [0, 5, *[0] * (len(seen) - 2)]
     x = states[1].position[len(end) :, 0]
     assert ((x >= 0) & (x < fast.case.size_m[0])).all()
@@ -191,13 +186,10 @@ def test_a_given_time_ends_with_its_mud_or_when_it_is_over(fast):
 
 def test_a_class_above_every_throat_is_said_to_be_cake(fast):
     case = tiny(*FAST, "fines.radius_mm=0.24", "fines.count=20")
-    wide, usual = (
-        class_model(one, invasion_scales(case), fast.spheres("initial"))
-        for one in (case, fast.case)
-    )
-    (said,) = all_is_cake(wide)
+    scales, grains = invasion_scales(case), fast.spheres("initial")
+    (said,) = by_classes.all_is_cake(class_model(case, scales, grains))
     assert said.startswith("fines of 480 to 480 µm are wider than every throat (")
-    assert not list(all_is_cake(usual))
+    assert not list(by_classes.all_is_cake(class_model(fast.case, scales, grains)))
 
 
 def test_a_pack_without_a_path_and_a_mud_above_packing_are_refused(fast, monkeypatch):

@@ -110,10 +110,19 @@ def test_springs_grow_with_the_square_of_the_steps_of_a_chunk():
     case = tiny(*FOLLOWED, "drag.scheme=implicit", "run.stiffness_N_m=auto")
     scales = invasion_scales(case)
     usual = scales.checkpoint_steps
-    assert steps_after(case, usual, 0.02) == usual
-    assert steps_after(case, usual, 0.03) == math.ceil(usual * math.sqrt(1 / 0.6))
-    assert steps_after(case, usual, 0.9) == 2 * usual
-    assert steps_after(case, usual, 0.03, 0.03) == usual, "a wedged fine"
+
+    def after(*lasted: float, raised: int = 0) -> float:
+        """Of the steps of the last chunk, with other springs in the first chunks that `raised`."""
+        steps = [usual // 2] * raised + [usual] * (len(lasted) - raised)
+        return steps_after(case, steps, lasted, 2) / usual
+
+    assert after(0.02) == 1
+    assert after(0.02, 0.03) == pytest.approx(math.sqrt(1 / 0.6), rel=1e-3)
+    assert after(0.9) == 2
+    assert after(0.03, 0.018, 0.033, raised=1) == 1, "a wedged fine that is watched in turns"
+    assert after(0.03, 0.033, 0.018, 0.033, raised=1) == 1
+    assert after(0.03, 0.018, 0.018, 0.022, raised=1) > 1, "loads have grown again"
+    assert after(0.03, 0.018, 0.018, 0.019, 0.02, 0.021, raised=1) > 1, "slowly"
     assert lasting_overlap([0.9, *[0.02] * 10]) == 0.02, "an impact is no load"
     assert lasting_overlap([0.9, 0.9, *[0.02] * 10]) == 0.9
     assert stiffened(case, scales, usual) is scales
@@ -127,7 +136,7 @@ def test_springs_grow_with_the_square_of_the_steps_of_a_chunk():
         share = scales.time_step / before.step_limit
         assert more.time_step / contact.step_limit == pytest.approx(share, rel=1e-12)
     given = tiny(*FOLLOWED, "run.stiffness_N_m=100000")
-    assert steps_after(given, usual, 0.9) == usual
+    assert steps_after(given, [usual], [0.9], 1) == usual
 
 
 def test_one_seed_has_one_pack_whatever_stiffness_the_invasion_takes():

@@ -10,7 +10,7 @@ the same expansion and scales as an orifice does where the slope is large:
 
     dR = 8 / (pi a^4) sqrt(dz^2 + 8/3 da^2).
 
-It is within 7.5 % of the exact flow through every hyperboloid from a long tube to Sampson's
+It is within 7.6 % of the exact flow through every hyperboloid from a long tube to Sampson's
 orifice (Happel and Brenner 1965, section 4-29).
 
 What holds the fluid in a section is in `cross_section`: the spheres at the corners, side walls, a
