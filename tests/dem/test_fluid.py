@@ -269,7 +269,7 @@ def test_a_face_is_plugged_once_all_that_moves_has_come_to_rest(go, fluid, tmp_p
     """The face alone was quiet before, while a fine left and others moved inside."""
     other = with_case(
         fluid,
-        "fines={radius_mm=[0.03,0.11], friction=0.0, count=150, concentration=0.2, supply='slab'}",
+        "fines={radius_mm=[0.03,0.11], friction=0.0, count=140, concentration=0.2, supply='slab'}",
         *("run.plug_time_ms=0.06", "run.checkpoint_ms=0.02", "run.cap_ms=2.0"),
         f"run.plug_rate={share}",
     )
