@@ -356,8 +356,7 @@ RAISE_ABOVE, RAISE_TO, GROWN, MOST_RAISE = 0.67, 0.6, 1.1, 2.0
 """Springs are stiffened at a checkpoint when the overlap that lasted in the chunk before was above
 the first share of `PRESSED`, so that it would have been the second. At most so many times the
 steps at once. A fine that is wedged between grains keeps its overlap with stiffer springs too: so
-the overlap must be `GROWN` times the largest of the first chunks with the present springs, in
-which each group of grains was watched. Until then what they were stiffened for counts as well."""
+the overlap must be `GROWN` times that in each of the `reference_chunks`."""
 
 
 def lasting_overlap(seen: Sequence[float]) -> float:
@@ -365,24 +364,30 @@ def lasting_overlap(seen: Sequence[float]) -> float:
     return sorted(seen)[math.ceil(9 * (len(seen) - 1) / 10)]
 
 
-def steps_after(
-    case: InvasionCase, steps: Sequence[int], lasted: Sequence[float], groups: int
-) -> int:
-    """Steps of the chunk after some of so many `steps`, in each of which an overlap `lasted`.
+def reference_chunks(steps: Sequence[int], groups: int) -> range:
+    """The chunks, from 0, with which the last of some of so many `steps` is compared.
 
-    It goes with the stiffness k to the power -1 (Hertz -2/3), the step with k to -1/2. Each chunk
-    watches the next of the `groups` of grains.
+    They are the first ones with the present springs, until all `groups` of grains were watched,
+    one in a chunk. Until then the chunk that the springs were stiffened for is one of them.
     """
     others = [chunk for chunk, one in enumerate(steps) if one != steps[-1]]
     first = others[-1] + 1 if others else 0  # with the present springs
-    whole = first + groups  # chunks until all grains were watched with them
+    whole = first + groups
     begin = first - 1 if first > 0 and len(steps) <= whole else first
-    known = lasted[begin : min(whole, len(steps) - 1)]
+    return range(begin, min(whole, len(steps) - 1))
+
+
+def steps_after(case: InvasionCase, steps: int, overlap: float, known: Iterable[float]) -> int:
+    """Steps of the chunk after one of `steps` steps in which an `overlap` lasted.
+
+    In the `reference_chunks` the `known` ones lasted. An overlap goes with the stiffness k to the
+    power -1 (Hertz -2/3), the step with k to -1/2.
+    """
     least = max(GROWN * max(known, default=0.0), RAISE_ABOVE * PRESSED)
-    if not rises(case) or lasted[-1] <= least:
-        return steps[-1]
+    if not rises(case) or overlap <= least:
+        return steps
     power = 0.75 if case.contact.model == "hertz" else 0.5
-    return math.ceil(steps[-1] * min(MOST_RAISE, (lasted[-1] / (RAISE_TO * PRESSED)) ** power))
+    return math.ceil(steps * min(MOST_RAISE, (overlap / (RAISE_TO * PRESSED)) ** power))
 
 
 # ---- The states of checkpoints, from their dumps.

@@ -293,16 +293,18 @@ class InvadeStage(ChunkedStage):
         """The scales of the chunk after `last`, with springs that bear what the chunk before saw.
 
         They follow from what the checkpoints up to it record: the steps, and the watched overlaps,
-        or the dumps where none are watched.
+        or dumps where none are watched.
         """
         case, scales = self.case, self.scales
         if last is None or not rises(case):
             return scales
         rows = [row for row in checkpoint.read_rows(self.folder) if row.chunk <= last.chunk]
         ends = [0, *(row.step for row in rows)]
-        lasted = [self._lasted(since, row) for since, row in zip(ends, rows, strict=False)]
         steps = [end - begin for begin, end in pairwise(ends)]
-        return stiffened(case, scales, checkpoint.steps_after(case, steps, lasted, self._turns))
+        chunks = checkpoint.reference_chunks(steps, self._turns)
+        known = [self._lasted(ends[chunk], rows[chunk]) for chunk in chunks]
+        seen = self._lasted(ends[-2], rows[-1])
+        return stiffened(case, scales, checkpoint.steps_after(case, steps[-1], seen, known))
 
     def _lasted(self, since: int, row: Checkpoint) -> float:
         """The overlap that lasted from the step `since` to a checkpoint."""

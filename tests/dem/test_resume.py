@@ -15,6 +15,7 @@ from builders import followed, tiny
 from cut_and_continue import cell_case, differences
 from robustness.runs import contents
 
+from fdnet.dem import checkpoint
 from fdnet.dem.checkpoint import UPDATES, Checkpoints, file_digest, read_updates, rows_digest
 from fdnet.dem.invasion import steps_between
 from fdnet.dem.liggghts import Launch, run_deck
@@ -244,7 +245,7 @@ def test_springs_grow_with_the_load_and_go_on_bit_for_bit(go, rising, tmp_path):
 
 @pytest.mark.parametrize("spoil", [noise, Path.unlink])
 def test_springs_do_not_follow_from_a_dump_that_is_spoilt(go, rising, tmp_path, spoil):
-    """Without watched overlaps the springs of a chunk follow from the dumps of all before."""
+    """Without watched overlaps the springs of a chunk follow from the dumps that are compared."""
     folder, history = shutil.copytree(rising[0], tmp_path / "cut"), rising[1].history
     kept = points(folder, RISING)
     (folder / "overlap.csv").unlink()
@@ -252,7 +253,8 @@ def test_springs_do_not_follow_from_a_dump_that_is_spoilt(go, rising, tmp_path, 
         kept.path(history[-1].step, suffix).unlink()
     for row in history[:-1]:
         kept.store(row.step, kept.record(row.step)._replace(overlap=rows_digest([])))
-    spoil(kept.path(history[0].step, "dump"))
+    steps = np.diff([0, *(row.step for row in history[:-1])]).tolist()
+    spoil(kept.path(history[checkpoint.reference_chunks(steps, 1)[-1]].step, "dump"))
     with pytest.raises(LiggghtsError, match="the springs of the next chunk follow from it"):
         go(RISING, folder)
 

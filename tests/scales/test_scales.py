@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from fdnet.case.case import Case
 from fdnet.case.file import case_from, read_case, set_keys
-from fdnet.dem.checkpoint import chunks_of, lasting_overlap, steps_after
+from fdnet.dem.checkpoint import chunks_of, lasting_overlap, reference_chunks, steps_after
 from fdnet.dem.invasion import invade
 from fdnet.dem.liggghts import Launch
 from fdnet.dem.supply import batches_of
@@ -114,7 +114,8 @@ def test_springs_grow_with_the_square_of_the_steps_of_a_chunk():
     def after(*lasted: float, raised: int = 0) -> float:
         """Of the steps of the last chunk, with other springs in the first chunks that `raised`."""
         steps = [usual // 2] * raised + [usual] * (len(lasted) - raised)
-        return steps_after(case, steps, lasted, 2) / usual
+        known = [lasted[chunk] for chunk in reference_chunks(steps, 2)]
+        return steps_after(case, usual, lasted[-1], known) / usual
 
     assert after(0.02) == 1
     assert after(0.02, 0.03) == pytest.approx(math.sqrt(1 / 0.6), rel=1e-3)
@@ -136,7 +137,7 @@ def test_springs_grow_with_the_square_of_the_steps_of_a_chunk():
         share = scales.time_step / before.step_limit
         assert more.time_step / contact.step_limit == pytest.approx(share, rel=1e-12)
     given = tiny(*FOLLOWED, "run.stiffness_N_m=100000")
-    assert steps_after(given, [usual], [0.9], 1) == usual
+    assert steps_after(given, usual, 0.9, ()) == usual
 
 
 def test_one_seed_has_one_pack_whatever_stiffness_the_invasion_takes():
