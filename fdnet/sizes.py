@@ -179,9 +179,20 @@ class SizeCurve:
         equal[[0, -1]] = self.low, self.high
         return np.unique(np.concatenate([equal, inner]))
 
+    @cached_property
+    def _known(self) -> dict[float, Array]:
+        """By power the `cells` so far: a run asks for the same few thousands of times."""
+        return {}
+
+    def cells(self, power: float) -> Array:
+        """(K,) integrals of d^power dF between neighbours of `edges`, F by `by`."""
+        if power not in self._known:
+            self._known[power] = self.law.cells(power, self.edges)
+        return self._known[power]
+
     def total(self, power: float) -> float:
         """Integral of d^power dF between the ends, F by `by`."""
-        return float(np.sum(self.law.cells(power, self.edges)))
+        return float(np.sum(self.cells(power)))
 
     def mean(self, power: float) -> float:
         """Mean of d^power by number, m^power."""
@@ -191,7 +202,7 @@ class SizeCurve:
 
     def finer(self, weight: int = VOLUME) -> Array:
         """(K + 1,) shares finer than `edges`, by number (0), surface (2) or volume (3)."""
-        sums = np.concatenate([[0.0], np.cumsum(self.law.cells(weight - self.by, self.edges))])
+        sums = np.concatenate([[0.0], np.cumsum(self.cells(weight - self.by))])
         return np.asarray(sums / sums[-1])
 
     def share_finer(self, diameter: Array, weight: int = VOLUME) -> Array:
