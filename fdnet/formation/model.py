@@ -16,7 +16,8 @@ from scipy.special import exprel
 from fdnet.errors import FlowError
 from fdnet.spheres.snapshot import Array
 
-FINENESS, TINY = 0.05, 1e-12  # Largest relative step, and what is as good as nothing
+FINENESS, FINEST = 0.05, 1e-2  # Largest relative step; a march refines it itself down to this
+TINY = 1e-12  # What is as good as nothing
 STRAIGHT = 1e9  # m, radius of a face that is as good as plane: over 0.1 m it errs by 5e-11
 FULL = "the cake of these fines alone fills the hole"
 CLOSED = "the face has the deposit of the run's end, and its cake is not known"
@@ -140,7 +141,8 @@ def march(
 
     A back-flow lifts the cake first. `taps` (S+1,) m are the depths between which sections are
     measured, by default the ends. `fineness` is the largest step over the volume of the drive; the
-    error falls with it to first order. Raises FlowError where a deposit would fall below 0.
+    error falls with it to first order. Where a deposit would fall below 0, all is marched anew
+    with a quarter of it. Raises FlowError where `FINEST` is not fine enough.
     """
     cells, mu = np.zeros((len(medium.rate), len(column.edges) - 1)), medium.viscosity
     state, ends = Filled(cells, cells, cells, 0.0, 0.0), column.edges[[0, -1]]
@@ -172,8 +174,14 @@ def march(
             if np.isinf(met[0]):
                 stopped = FULL if medium.cake_permeability else CLOSED
                 break
-            if after.deposit.min() < 0:
-                raise FlowError(f"a deposit fell below 0: give a fineness below {fineness:g}")
+            if after.deposit.min() < -TINY * after.deposit.max():
+                if fineness > FINEST:
+                    return march(column, medium, drives, taps=taps, fineness=fineness / 4)
+                raise FlowError(
+                    f"core or well: a deposit falls below 0 in steps of {fineness:.2g} of the "
+                    f"volume, where the run hands up a growth of {medium.growth.min():.3g}; "
+                    "hand up several seeds or a run with more fines"
+                )
             left = end - time - seconds
             time = end if left < TINY * drive.seconds else time + seconds
             filtrate, since, state, parts = filtrate + way * step, since + step, after, met

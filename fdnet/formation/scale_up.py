@@ -433,6 +433,8 @@ def _banded(
 ) -> dict[str, Any]:
     """What the model gives for all that is handed up, with bands: of seeds, or of the fits."""
     many = source if isinstance(source, list) else hand_up(source, api_filtrate=api_filtrate)
+    if not many:
+        raise CaseError("core or well: an empty list, expected what hand_up gives of a run")
     if (by := many[0].api_filtrate) != api_filtrate:
         raise CaseError(f"api_filtrate: {api_filtrate}, expected {by} as it was handed up with")
     seeds = len({one.run.path for one in many})
@@ -471,7 +473,12 @@ def _merged(trees: Sequence[Any], seeds: int) -> Any:
 
 
 def with_band(row: Mapping[str, Any], key: str) -> str:
-    """The number of a row with its band, and of whom it is; a share in percent."""
+    """The number of a row with its band, and of whom it is; a share in percent.
+
+    A number that the run itself does not have is unknown, whatever its other fits have.
+    """
+    if row[key] is None:
+        return f"unknown ({row[f'{key}_of']} have it)" if f"{key}_of" in row else "unknown"
     share = key.endswith(("_over_k0", "_lost"))
     values = [row[key], row.get(f"{key}_low"), row.get(f"{key}_high")]
     one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.3g}" for v in values)

@@ -74,8 +74,9 @@ def test_filtration_is_that_of_the_deposit_half_way():
     full, fuller = (mud((0.01, 30.0, growth)) for growth in (-50.0, -2000.0))
     fine, usual = (flood(CORE, 8.0, fineness=f, **full).end.deposit for f in (0.005, 0.05))
     assert usual == pytest.approx(fine, abs=4e-5)
-    with pytest.raises(FlowError, match=r"below 0: give a fineness below 0\.05"):
-        flood(CORE, 8.0, **fuller)
+    assert flood(CORE, 8.0, **fuller).end.deposit == pytest.approx(0.0005)  # by finer steps
+    with pytest.raises(FlowError, match=r"below 0 in steps of 0\.01 of the volume"):
+        flood(CORE, 8.0, fineness=0.01, **mud((0.01, 30.0, -1e5)))
 
 
 def test_no_fines_are_lost_or_made():

@@ -249,6 +249,8 @@ def test_the_commands_hand_up_once_and_keep_all(finished, tmp_path, capsys, monk
         assert said in capsys.readouterr().err
     assert main(["well", str(run), "--pressure", "2MPa", "--radius", "99.8m"]) == 2
     assert "99.8 m, expected below 99.7 m, the drainage radius" in capsys.readouterr().err
+    with pytest.raises(CaseError, match="an empty list"):
+        well_invasion([])
     with pytest.raises(CaseError, match="api_filtrate: 8e-06, expected None as it was handed up"):
         well_invasion(hand_up(finished), api_filtrate=8e-6)
 
@@ -262,6 +264,7 @@ def test_of_several_seeds_the_band_is_students():
     found = scale_up._merged(rows, seeds=3)
     assert scale_up.with_band(found, "a") == "2 (-0.484 to 4.48)"
     assert scale_up.with_band(found, "f") == "5 (-7.71 to 17.7), 2 of 3 seeds"
-    assert scale_up._merged(rows, seeds=1)["f_of"] == "2 of 3 fits"
+    unknown = scale_up.with_band(scale_up._merged(rows, seeds=1), "f")
+    assert unknown == "unknown (2 of 3 fits have it)"
     assert found["b"] == {"c": 2.0}
     assert found["d"][0]["e"] == 3.0
