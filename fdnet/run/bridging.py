@@ -7,6 +7,7 @@ Shares of a count have Wilson's 95 % band (J. Am. Stat. Assoc. 22, 209, 1927).
 
 import math
 from collections.abc import Sequence
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -89,10 +90,11 @@ def ratio_rows(
 
 def wilsons_band(hits: int, trials: int) -> tuple[float, float]:
     """The 95 % interval of a binomial share (Wilson 1927, J. Am. Stat. Assoc. 22, 209)."""
-    from scipy.stats import binomtest  # slow to import
-
-    band = binomtest(hits, trials).proportion_ci(method="wilson")
-    return float(band.low), float(band.high)
+    # by its formula, since scipy.stats takes longer to import than a quick case to analyse
+    square = NormalDist().inv_cdf(0.975) ** 2
+    wide = math.sqrt(square * (hits * (trials - hits) / trials + square / 4))
+    low, high = (hits + square / 2 + side * wide for side in (-1, 1))
+    return max(low / (trials + square), 0.0) if hits else 0.0, min(high / (trials + square), 1.0)
 
 
 def class_row(
