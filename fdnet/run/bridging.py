@@ -93,8 +93,8 @@ def wilsons_band(hits: int, trials: int) -> tuple[float, float]:
     # by its formula, since scipy.stats takes longer to import than a quick case to analyse
     square = NormalDist().inv_cdf(0.975) ** 2
     wide = math.sqrt(square * (hits * (trials - hits) / trials + square / 4))
-    low, high = (hits + square / 2 + side * wide for side in (-1, 1))
-    return max(low / (trials + square), 0.0) if hits else 0.0, min(high / (trials + square), 1.0)
+    low, high = ((hits + square / 2 + side * wide) / (trials + square) for side in (-1, 1))
+    return low if hits else 0.0, high if hits < trials else 1.0
 
 
 def class_row(

@@ -88,3 +88,4 @@ def test_wilsons_band():
         (81, 263, (0.2553, 0.3662)),
     ]:
         assert wilsons_band(hits, trials) == pytest.approx(band, abs=5e-5), (hits, trials)
+    assert all((wilsons_band(0, n)[0], wilsons_band(n, n)[1]) == (0.0, 1.0) for n in range(1, 99))
