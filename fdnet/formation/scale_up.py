@@ -475,7 +475,7 @@ def _merged(trees: Sequence[Any], seeds: int) -> Any:
 def with_band(row: Mapping[str, Any], key: str) -> str:
     """The number of a row with its band, and of whom it is; a share in percent.
 
-    A number that the run itself does not have is unknown, whatever its other fits have.
+    A number that a single run does not have is unknown, even where some of its fits have one.
     """
     if row[key] is None:
         return f"unknown ({row[f'{key}_of']} have it)" if f"{key}_of" in row else "unknown"

@@ -65,8 +65,7 @@ def langmuir_error(cells):
 def test_the_langmuir_solution_is_met_with_first_order():
     coarse, fine, finer = map(langmuir_error, (50, 100, 200))
     assert finer < 0.01
-    assert 1.7 < coarse / fine < 2.4
-    assert 1.7 < fine / finer < 2.4
+    assert all(1.7 < order < 2.4 for order in (coarse / fine, fine / finer))
 
 
 def test_filtration_is_that_of_the_deposit_half_way():

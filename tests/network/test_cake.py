@@ -78,7 +78,6 @@ def test_cakes_that_liggghts_made_resist_as_resolved_flow_does(name):
     assert 0.40 < cake.packed_porosity < 0.50
 
 
-# ---- Throats that fines bridge.
 def test_wilsons_band():
     """Values of Brown, Cai and DasGupta (2001), and Newcombe (1998) for 81 of 263."""
     for hits, trials, band in [
