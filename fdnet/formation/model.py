@@ -16,7 +16,7 @@ from scipy.special import exprel
 from fdnet.errors import FlowError
 from fdnet.spheres.snapshot import Array
 
-FINENESS, FINEST = 0.05, 1e-2  # Largest relative step; a march refines it itself down to this
+FINENESS, FINEST = 0.05, 1e-2  # Largest relative step; a march refines one above the second
 TINY = 1e-12  # What is as good as nothing
 STRAIGHT = 1e9  # m, radius of a face that is as good as plane: over 0.1 m it errs by 5e-11
 FULL = "the cake of these fines alone fills the hole"
@@ -142,7 +142,7 @@ def march(
     A back-flow lifts the cake first. `taps` (S+1,) m are the depths between which sections are
     measured, by default the ends. `fineness` is the largest step over the volume of the drive; the
     error falls with it to first order. Where a deposit would fall below 0, all is marched anew
-    with a quarter of it. Raises FlowError where `FINEST` is not fine enough.
+    with a quarter of it, until it is below `FINEST`. Raises FlowError where that does not help.
     """
     cells, mu = np.zeros((len(medium.rate), len(column.edges) - 1)), medium.viscosity
     state, ends = Filled(cells, cells, cells, 0.0, 0.0), column.edges[[0, -1]]
@@ -179,8 +179,8 @@ def march(
                     return march(column, medium, drives, taps=taps, fineness=fineness / 4)
                 raise FlowError(
                     f"core or well: a deposit falls below 0 in steps of {fineness:.2g} of the "
-                    f"volume, where the run hands up a growth of {medium.growth.min():.3g}; "
-                    "hand up several seeds or a run with more fines"
+                    f"volume, because filtration changes too fast with the deposit (growth "
+                    f"{medium.growth.min():.3g}); hand up several seeds or a run with more fines"
                 )
             left = end - time - seconds
             time = end if left < TINY * drive.seconds else time + seconds

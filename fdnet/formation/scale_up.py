@@ -477,14 +477,15 @@ def with_band(row: Mapping[str, Any], key: str) -> str:
 
     A number that a single run does not have is unknown, even where some of its fits have one.
     """
+    of = row.get(f"{key}_of")
     if row[key] is None:
-        return f"unknown ({row[f'{key}_of']} have it)" if f"{key}_of" in row else "unknown"
+        return f"unknown ({of} have it)" if of else "unknown"
     share = key.endswith(("_over_k0", "_lost"))
     values = [row[key], row.get(f"{key}_low"), row.get(f"{key}_high")]
     one, *band = (None if v is None else f"{100 * v:.3g}" if share else f"{v:.3g}" for v in values)
-    unit, of = " %" if share else "", f", {row[f'{key}_of']}" if f"{key}_of" in row else ""
+    unit, whose = " %" if share else "", f", {of}" if of else ""
     ends = "" if None in band else f" ({band[0]} to {band[1]}{unit})"
-    return f"{one}{unit}{ends}{of}"
+    return f"{one}{unit}{ends}{whose}"
 
 
 def _above_zero(**given: float | None) -> None:

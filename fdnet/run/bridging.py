@@ -90,7 +90,7 @@ def ratio_rows(
 
 def wilsons_band(hits: int, trials: int) -> tuple[float, float]:
     """The 95 % interval of a binomial share (Wilson 1927, J. Am. Stat. Assoc. 22, 209)."""
-    # by its formula, since scipy.stats takes longer to import than a quick case to analyse
+    # by its formula: to import scipy.stats takes 0.7 s, the bands of a whole run next to nothing
     square = NormalDist().inv_cdf(0.975) ** 2
     wide = math.sqrt(square * (hits * (trials - hits) / trials + square / 4))
     low, high = ((hits + square / 2 + side * wide) / (trials + square) for side in (-1, 1))
